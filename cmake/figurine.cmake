@@ -1,0 +1,43 @@
+# Build settings that every target shares, and the few functions that the folders' lists use.
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE RelWithDebInfo CACHE STRING "" FORCE)
+endif()
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_CXX_VISIBILITY_PRESET hidden)
+set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
+# RelWithDebInfo keeps FIG_DCHECK: it tests FIGURINE_DCHECKS, not NDEBUG.
+set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DFIGURINE_DCHECKS=1")
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
+
+find_program(FIGURINE_CCACHE ccache)
+if(FIGURINE_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${FIGURINE_CCACHE}")
+endif()
+
+# One arithmetic on every CPU: no fused multiply-add behind the code's back (docs/numerics.md, "Same pixels").
+add_compile_options(-ffp-contract=off -Wall -Wextra -Wshadow -Wno-missing-field-initializers)
+if(FIGURINE_SANITIZE)
+  add_compile_options(-fsanitize=${FIGURINE_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${FIGURINE_SANITIZE})
+endif()
+if(FIGURINE_SCALAR)
+  add_compile_options(-fno-tree-vectorize -fno-tree-slp-vectorize)
+endif()
+
+# figurine_test(NAME SOURCES... LIBRARIES...): a GoogleTest program, one ctest entry. Running no test is a failure.
+function(figurine_test name)
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LIBRARIES;DEFINITIONS;LABELS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest GTest::gtest_main)
+  target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}/tests")
+  target_compile_definitions(${name} PRIVATE FIGURINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ${arg_DEFINITIONS})
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES FAIL_REGULAR_EXPRESSION "Running 0 tests" LABELS "${arg_LABELS}")
+  if(arg_TIMEOUT)
+    set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT})
+  endif()
+endfunction()

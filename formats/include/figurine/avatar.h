@@ -1,0 +1,61 @@
+// An avatar: the weights of one pose UNet, how its input is standardised and its head is decoded, and the person's shape.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "figurine/body.h"
+#include "figurine/camera.h"
+#include "figurine/network.h"
+
+namespace figurine {
+
+// Which canonical texels and joints the Gaussians sit on. The network's input is the mean template's in both cases.
+enum class TemplateMode : uint8_t { kMean, kShaped };
+
+// Head channels to Gaussians, per texel i with raw outputs h:
+//   offset = offset_scale_m * h[0:3];   scale = spacing_scale * texel_spacing_m[i] * exp(clamp(h[3:6], -max_log_scale, max_log_scale));
+//   quaternion = (1,0,0,0) + h[6:10], normalised;   opacity = 1 / (1 + exp(-(h[10] + opacity_bias)));   SH = h[11:].
+struct HeadDecoding {
+  float offset_scale_m = 0.05f;
+  float spacing_scale = 0.6f;
+  float max_log_scale = 4.0f;  // bounds what a pose far outside the training range can do; never active on trained poses
+  float opacity_bias = 2.0f;
+  uint32_t sh_degree = 0;
+};
+
+// Mean and covariance of the training poses' body rotations, for telling how unusual a pose is: features are rotation vectors (axis times angle,
+// radians) of the listed joints, concatenated.
+struct PoseStatistics {
+  std::vector<uint8_t> joints;        // [P]
+  std::span<const float> mean;        // [3P]
+  std::span<const float> covariance;  // [3P,3P] symmetric, regularised to be positive definite
+};
+
+struct GoldenFrame {
+  std::array<float, 3> root_translation_m{0, 0, 0};
+  std::span<const float> rotations;  // [J,4]
+  Camera camera;
+  std::array<float, 3> background{0.5f, 0.5f, 0.5f};
+  std::span<const uint8_t> png;  // 8-bit RGB of the trainer's renderer over the background; may be empty
+};
+
+struct Avatar {
+  std::string name;
+  std::string body_name;
+  std::array<uint64_t, 2> body_hash{0, 0};  // content hash of the body package (low, high)
+  std::string preset;                       // for people; the layers decide
+  TemplateMode template_mode = TemplateMode::kShaped;
+  std::span<const float> shape;  // [<= S]
+  MapStatistics map_statistics;
+  uint32_t fourier_octaves = 0;
+  HeadDecoding decoding;
+  Network network;
+  PoseStatistics pose_statistics;
+  GoldenFrame golden;
+};
+
+}  // namespace figurine

@@ -1,0 +1,112 @@
+// Reads a .fgn package: 64-byte header, flatbuffer index, 64-byte-aligned blobs (docs/package.md; formats/schema/package.fbs is the manual of the index).
+//
+// Opening verifies in stages and always: size, magic, version, exact length, ranges, checksums (XXH3-64 of the index and of every blob), the
+// flatbuffers Verifier with tight limits, then meaning (shapes x type = bytes, finite values, positive scales, parents before children, declared
+// budgets). After that no access can fail, and views point into the caller's bytes: keep them mapped and unchanged while a view lives.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "figurine/avatar.h"
+#include "figurine/body.h"
+#include "figurine/motion.h"
+#include "figurine/status.h"
+
+namespace figurine {
+
+inline constexpr uint32_t kPackageVersion = 1;
+inline constexpr size_t kPackageHeaderBytes = 64;
+inline constexpr size_t kBlobAlignment = 64;
+
+enum class PackageKind : uint8_t { kBody = 1, kAvatar = 2, kMotion = 3 };
+const char* to_string(PackageKind kind);
+
+enum class DataType : uint8_t { kF32 = 0, kU8 = 1, kI16 = 2, kU32 = 3 };
+const char* to_string(DataType type);
+size_t size_bytes(DataType type);
+
+// What a device needs to know before it loads.
+struct Budget {
+  uint64_t peak_memory_bytes = 0;  // of the runtime for one instance, image and package excluded; 0: not applicable
+  uint64_t macs_per_frame = 0;
+  uint32_t gaussians = 0;
+};
+
+struct QualityMetric {
+  std::string name;  // as in docs/results, e.g. psnr_pose_db
+  double value = 0;
+};
+
+struct KeyValue {
+  std::string key;
+  std::string value;
+};
+
+// Where a package came from and what may be done with it. Licence and consent after VRM 1.0's meta.
+struct Provenance {
+  std::string tool;                // "figurine-train 0.1.0"
+  std::string created;             // ISO 8601 date, or empty for reproducible bytes
+  std::vector<KeyValue> settings;  // command, seeds, training settings
+  std::vector<std::string> sources;  // data: name, version, licence
+  std::vector<QualityMetric> quality;
+  std::string licence_name;
+  std::string licence_url;
+  std::vector<std::string> authors;
+  std::string avatar_permission;   // who may perform: "onlyAuthor", "onlySeparatelyLicensedPerson", "everyone"
+  std::string commercial_usage;    // "personalNonProfit", "personalProfit", "corporation"
+  std::string depicted_person;     // "synthetic", or how consent was given
+};
+
+// A tensor of the index, for the inspector and for --diff.
+struct TensorInfo {
+  std::string name;
+  DataType type = DataType::kF32;
+  std::vector<uint32_t> shape;
+  uint64_t offset_bytes = 0;
+  uint64_t size_bytes = 0;
+  uint64_t checksum = 0;
+};
+
+class Package {
+ public:
+  // bytes must be 64-byte aligned (a memory map or an aligned buffer is) and outlive the Package. name appears in messages.
+  static Result<Package> open(std::span<const std::byte> bytes, const std::string& name);
+
+  Package(Package&&) noexcept;
+  Package& operator=(Package&&) noexcept;
+  ~Package();
+
+  PackageKind kind() const;
+  uint32_t version() const;
+  uint64_t required_features() const;
+  uint64_t optional_features() const;
+  // XXH3-128 over header and index; the index holds every blob's checksum, so it names the whole content. (low, high)
+  std::array<uint64_t, 2> content_hash() const;
+
+  const Body& body() const;      // kind must be kBody
+  const Avatar& avatar() const;  // kind must be kAvatar
+  const Motion& motion() const;  // kind must be kMotion
+  const Budget& budget() const;
+  const Provenance& provenance() const;
+  const std::vector<TensorInfo>& tensors() const;
+  uint64_t size_bytes() const;
+
+ private:
+  struct Contents;
+  explicit Package(std::unique_ptr<Contents> contents);
+  std::unique_ptr<Contents> contents_;
+};
+
+std::string format_hash(const std::array<uint64_t, 2>& hash);  // 32 hex digits
+
+// An avatar fits a body if the hash, the UV size, the shape count and the golden pose's joint count do. kMismatch names both hashes.
+Status check_avatar_fits_body(const Avatar& avatar, const Package& body);
+Status check_motion_fits_body(const Motion& motion, const Body& body);
+
+}  // namespace figurine

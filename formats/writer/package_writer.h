@@ -1,0 +1,19 @@
+// Builds .fgn packages (formats/include/figurine/package.h). No LibTorch, no exceptions, no files: bytes out. Linked by the toolchain, samples and tests,
+// never by the runtime library.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "figurine/package.h"
+
+namespace figurine {
+
+// The views' arrays are copied. What is written is opened again before it is returned, so an unsound description is an error here, with the reader's
+// reason. The same input gives the same bytes.
+Result<std::vector<std::byte>> write_package(const Body& body, const Provenance& provenance);
+Result<std::vector<std::byte>> write_package(const Avatar& avatar, const Budget& budget, const Provenance& provenance);
+Result<std::vector<std::byte>> write_package(const Motion& motion, const Provenance& provenance);
+
+}  // namespace figurine

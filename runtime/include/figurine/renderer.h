@@ -1,0 +1,103 @@
+// The device's renderer: avatars and poses in, pixels out. No files, no clock, no exceptions, no allocation per frame after the first.
+//
+//   auto renderer = Renderer::create({.threads = 2});
+//   auto walker = (*renderer)->add_avatar(avatar_package, body_package);
+//   FrameAvatar seen[] = {{.avatar = *walker, .pose = motion.pose(12)}};
+//   (*renderer)->render({.camera = camera, .avatars = seen}, {.pixels = rgba, .stride_bytes = 4 * width, .format = PixelFormat::kRgba8});
+//
+// A frame takes any number of avatars and static Gaussians, sorted together by view depth. Packages are borrowed: their bytes must outlive the renderer.
+// A Renderer is used by one thread at a time; it spreads its own work over its pool.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "figurine/camera.h"
+#include "figurine/gaussian.h"
+#include "figurine/package.h"
+#include "figurine/pose.h"
+#include "figurine/status.h"
+
+namespace figurine {
+
+enum class AvatarId : uint32_t {};
+
+enum class PixelFormat : uint8_t {
+  kRgba8,    // sRGB-encoded as stored in the Gaussians, straight alpha, rounded to nearest
+  kRgbaF32,  // the same without rounding or clamping
+};
+
+// Where a frame goes: height rows of stride_bytes, top row first. The caller owns the pixels.
+struct ImageTarget {
+  void* pixels = nullptr;
+  size_t stride_bytes = 0;
+  PixelFormat format = PixelFormat::kRgba8;
+};
+
+struct SplatOptions {
+  float alpha_cut = kAlphaCut;  // contributions below it are skipped; in (0, 0.5]
+};
+
+struct FrameAvatar {
+  AvatarId avatar{};
+  PoseView pose;
+};
+
+struct Frame {
+  Camera camera;
+  std::span<const FrameAvatar> avatars;
+  std::span<const GaussianView> gaussians;           // static, world space
+  std::optional<std::array<float, 3>> background;  // opaque colour behind; without it the image keeps its alpha
+  SplatOptions splat;
+};
+
+enum class Stage : uint8_t { kMaps, kNetwork, kDecode, kSkin, kProject, kBin, kSort, kBlend, kResolve };
+inline constexpr size_t kStageCount = 9;
+const char* to_string(Stage stage);
+
+struct FrameStatistics {
+  std::array<uint64_t, kStageCount> stage_ns{};  // zero without a clock
+  uint64_t gaussians = 0;                        // given to projection
+  uint64_t visible = 0;                          // left after culling
+  uint64_t pairs = 0;                            // (Gaussian, tile)
+  uint64_t blends = 0;                           // contributions blended into pixels
+  uint64_t macs = 0;
+};
+
+struct RendererOptions {
+  uint32_t threads = 1;  // 1 to 64
+  // The runtime has no clock of its own: with one, render() fills stage_ns.
+  uint64_t (*now_ns)() = nullptr;
+};
+
+class Renderer {
+ public:
+  static Result<std::unique_ptr<Renderer>> create(const RendererOptions& options);
+  ~Renderer();
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  // Packs the network's weights and allocates what a frame of it needs. kMismatch if the avatar was made for another body.
+  Result<AvatarId> add_avatar(const Package& avatar, const Package& body);
+
+  // Draws one frame. kInvalidArgument on an unsound camera, pose, target or Gaussian count; nothing was drawn then. Gaussians that are not finite are
+  // left out, one by one. The same input gives the same pixels for any number of threads.
+  Status render(const Frame& frame, const ImageTarget& target);
+
+  // The world-space Gaussians of one avatar in one pose, as render() would splat them; valid until the next call. For export and inspection.
+  Result<GaussianView> pose_avatar(AvatarId avatar, const PoseView& pose);
+
+  const FrameStatistics& statistics() const;  // of the last frame
+  uint64_t memory_bytes() const;              // held now, XNNPACK's packed weights estimated
+
+ private:
+  struct Impl;
+  explicit Renderer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace figurine

@@ -1,0 +1,17 @@
+// One function per command of figurine-train: adds the subcommand, its options and the callback that runs it. Callbacks throw InputError on bad input.
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace figurine::cli {
+
+void add_body_command(CLI::App& app);
+void add_motion_command(CLI::App& app);
+void add_capture_command(CLI::App& app);
+void add_avatar_command(CLI::App& app);
+void add_pack_command(CLI::App& app);
+void add_evaluate_command(CLI::App& app);
+
+}  // namespace figurine::cli

@@ -1,0 +1,31 @@
+// figurine-train: the offline commands. Only this folder catches exceptions: exit 1 bad input, 2 usage, 3 bug.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "toolchain/cli/commands.h"
+#include "toolchain/error.h"
+
+int main(int argc, char** argv) {
+  CLI::App app{"figurine-train: bodies, captures, avatars and packages, offline"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "figurine-train " FIGURINE_VERSION);
+  figurine::cli::add_body_command(app);
+  figurine::cli::add_motion_command(app);
+  figurine::cli::add_capture_command(app);
+  figurine::cli::add_avatar_command(app);
+  figurine::cli::add_pack_command(app);
+  figurine::cli::add_evaluate_command(app);
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const figurine::InputError& error) {
+    std::fprintf(stderr, "figurine-train: %s\n", error.what());
+    return 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "figurine-train: internal error: %s\n", error.what());
+    return 3;
+  }
+}
