@@ -1,0 +1,75 @@
+// The pose UNet as a trainable module, built from figurine::Network (make_pose_unet), and the optimiser over its weights.
+//
+// All weights live in one flat float tensor, layer after layer: kernel [out,k,k,in] (OHWI, as the package stores it), then bias. One token
+// of the sampler is one layer's stretch of it. Convolutions run channels-last, in bf16 if asked for (the head stays in float).
+#pragma once
+
+#include <torch/torch.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "figurine/network.h"
+
+namespace figurine::model {
+
+enum class Precision : uint8_t { kFloat32, kBfloat16 };
+
+struct PoseUNetOptions {
+  Precision precision = Precision::kBfloat16;  // of the convolutions' arithmetic; weights, gradients and the head stay float
+  uint64_t seed = 0;                           // of the initial weights: the same on every machine
+  float head_weight_factor = 0.1f;             // He initialisation, the head's weights times this
+  float rgb_bias = 0.3f;                       // initial bias of the head's three SH degree 0 channels; all other biases are zero
+};
+
+class PoseUNet {
+ public:
+  // network: shapes only (its weights, if any, are not read). Throws InputError if it is unsound.
+  PoseUNet(const Network& network, const PoseUNetOptions& options);
+  ~PoseUNet();
+
+  // input: [T,T,Cin] float, contiguous. Returns the raw head output [T,T,Cout] float, contiguous, differentiable by the weights (not by the
+  // input).
+  torch::Tensor forward(const torch::Tensor& input);
+
+  torch::Tensor& weights();    // [P] flat float; a leaf that requires a gradient
+  torch::Tensor& gradients();  // [P] flat float; backward passes add to it
+  void zero_gradients();
+
+  uint64_t parameter_count() const;
+  std::vector<uint64_t> token_lengths() const;  // per convolution: kernel + bias
+
+  // The network with weights: spans into `storage`, which is filled with a copy of the flat weights.
+  Network export_network(std::vector<float>& storage) const;
+  // Throws InputError if the shapes differ.
+  void import_network(const Network& network);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+struct AdamWOptions {
+  double beta1 = 0.9, beta2 = 0.999;
+  double epsilon = 1e-10;  // 1e-8 may swallow the small gradients of a mean loss
+  double weight_decay = 0.0;
+};
+
+// AdamW over one flat tensor in one pass. Based on: Loshchilov & Hutter, Decoupled Weight Decay Regularization, 2019, algorithm 2.
+class AdamW {
+ public:
+  AdamW(uint64_t parameters, const AdamWOptions& options);
+  // weights and gradients: [P] float. A gradient that is not finite leaves everything as it was and returns false.
+  bool step(torch::Tensor& weights, const torch::Tensor& gradients, double learning_rate);
+
+  // State for checkpoints: first and second moments [P] and the number of steps.
+  torch::Tensor first_moment, second_moment;
+  int64_t steps = 0;
+
+ private:
+  AdamWOptions options_;
+};
+
+}  // namespace figurine::model
