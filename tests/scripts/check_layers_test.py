@@ -1,0 +1,99 @@
+"""Each rule of scripts/check_layers, broken once in an otherwise sound tree, must be caught and named; the sound tree must pass."""
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+CHECKER = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_layers"
+
+SOUND = {
+    "formats/include/figurine/pose.h": "#include <array>\n",
+    "formats/include/figurine/check.h": "#include <cstdio>\n",
+    "formats/src/package.cpp": '#include <flatbuffers/verifier.h>\n#include <xxhash.h>\n#include "figurine/pose.h"\n',
+    "formats/writer/package_writer.h": '#include "figurine/pose.h"\n',
+    "formats/inspect/main.cpp": '#include <iostream>\n#include "ports/linux/files.h"\n#include "figurine/pose.h"\n',
+    "runtime/include/figurine/renderer.h": '#include "figurine/pose.h"\n',
+    "runtime/src/nn/unet.cpp": '#include <xnnpack.h>\n#include "runtime/src/splat/blend.h"\n// throws nothing; "try {" in a comment is no try\n',
+    "runtime/src/splat/blend.h": '#include <glm/glm.hpp>\n',
+    "ports/linux/files.h": '#include <sys/mman.h>\n#include <png.h>\n#include "figurine/pose.h"\n',
+    "samples/figurine/main.cpp": '#include <CLI/CLI.hpp>\n#include "figurine/renderer.h"\n#include "ports/linux/files.h"\n',
+    "toolchain/model/unet.cpp": '#include <torch/torch.h>\n#include "formats/writer/package_writer.h"\nvoid f() { try { throw 1; } catch (int) {} }\n',
+    "toolchain/capture/render.cpp": '#include <embree4/rtcore.h>\n#include <jpeglib.h>\n#include "toolchain/model/unet.h"\n',
+    "toolchain/model/unet.h": '#include <Eigen/Dense>\n',
+    "toolchain/verify/parity.cpp": '#include "figurine/renderer.h"\n',
+    "toolchain/cli/main.cpp": '#include <CLI/CLI.hpp>\n#include "toolchain/model/unet.h"\n',
+    "tests/runtime/renderer_test.cpp": '#include <gtest/gtest.h>\n#include "figurine/renderer.h"\n#include "formats/writer/package_writer.h"\n',
+}
+
+BREACHES = [  # (file, its text, words that the report must hold)
+    ("formats/src/a.cpp", '#include "figurine/renderer.h"\n', "formats may not use runtime"),
+    ("formats/src/a.cpp", '#include "formats/writer/package_writer.h"\n', "formats may not use formats/writer"),
+    ("formats/src/a.cpp", '#include "ports/linux/files.h"\n', "formats may not use ports"),
+    ("formats/src/a.cpp", '#include <png.h>\n', "png.h: only in"),
+    ("formats/include/figurine/a.h", '#include <flatbuffers/flatbuffers.h>\n', "flatbuffers.h: only in"),
+    ("formats/include/figurine/a.h", '#include "package_generated.h"\n', "package_generated.h: only in"),
+    ("formats/include/figurine/a.h", '#include <xxhash.h>\n', "xxhash.h: only in"),
+    ("formats/writer/a.cpp", '#include <fstream>\n', "fstream: formats/writer has no files"),
+    ("formats/writer/a.cpp", 'void f() {\n  throw 1;\n}\n', "formats/writer/a.cpp:2: throws"),
+    ("runtime/src/a.cpp", '#include "formats/writer/package_writer.h"\n', "runtime may not use formats/writer"),
+    ("runtime/src/a.cpp", '#include "ports/linux/files.h"\n', "runtime may not use ports"),
+    ("runtime/src/a.cpp", '#include "toolchain/model/unet.h"\n', "runtime may not use toolchain"),
+    ("runtime/src/a.cpp", '#include "../../toolchain/model/unet.h"\n', "runtime/src/a.cpp:1"),
+    ("runtime/src/a.cpp", '#include <torch/torch.h>\n', "torch/torch.h: only in"),
+    ("runtime/src/a.cpp", '#include <c10/core/Device.h>\n', "c10/core/Device.h: only in"),
+    ("runtime/src/splat/a.cpp", '#include <xnnpack.h>\n', "xnnpack.h: only in runtime/src/nn"),
+    ("runtime/src/splat/a.cpp", '#  include <pthreadpool.h>\n', "pthreadpool.h: only in runtime/src/nn"),
+    ("runtime/src/a.cpp", '#include <chrono>\n', "chrono: runtime has no files"),
+    ("runtime/src/a.cpp", '#include <iostream>\n', "iostream: runtime has no files"),
+    ("runtime/src/a.cpp", '#include <cstdio>\n', "cstdio: runtime has no files"),
+    ("runtime/src/a.cpp", '#include <thread>\n', "thread: runtime has no files"),
+    ("runtime/src/a.cpp", '#include <sys/stat.h>\n', "sys/stat.h: runtime has no files"),
+    ("runtime/src/a.cpp", '#include <stdexcept>\n', "stdexcept: runtime has no files"),
+    ("runtime/src/a.cpp", 'void f() {\n  try {\n  } catch (...) {\n  }\n}\n', "runtime/src/a.cpp:3: catches"),
+    ("runtime/src/a.cpp", '#include <nlohmann/json.hpp>\n', "nlohmann/json.hpp: only in"),
+    ("ports/linux/a.cpp", '#include "toolchain/model/unet.h"\n', "ports may not use toolchain"),
+    ("ports/linux/a.cpp", '#include "samples/figurine/a.h"\n', "samples/figurine/a.h: no such header"),
+    ("ports/linux/a.cpp", '#include <CLI/CLI.hpp>\n', "CLI/CLI.hpp: only in"),
+    ("samples/figurine/a.cpp", '#include "toolchain/model/unet.h"\n', "samples may not use toolchain"),
+    ("samples/figurine/a.cpp", '#include <xnnpack.h>\n', "xnnpack.h: only in runtime/src/nn"),
+    ("toolchain/model/a.cpp", '#include "figurine/renderer.h"\n', "toolchain may not use runtime"),
+    ("toolchain/model/a.cpp", '#include "runtime/src/splat/blend.h"\n', "toolchain may not use runtime"),
+    ("toolchain/model/a.cpp", '#include "samples/figurine/main.cpp"\n', "toolchain may not use samples"),
+    ("toolchain/model/a.cpp", '#include <embree4/rtcore.h>\n', "embree4/rtcore.h: only in toolchain/capture"),
+    ("toolchain/model/a.cpp", '#include <png.h>\n', "png.h: only in"),
+    ("toolchain/model/a.cpp", '#include <CLI/CLI.hpp>\n', "CLI/CLI.hpp: only in"),
+    ("toolchain/verify/a.cpp", '#include "samples/figurine/main.cpp"\n', "toolchain/verify may not use samples"),
+    ("samples/figurine/a.cpp", '#include <gtest/gtest.h>\n', "gtest/gtest.h: only in tests"),
+]
+
+
+def check(files):
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in files.items():
+            path = pathlib.Path(folder, name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        run = subprocess.run([sys.executable, str(CHECKER), folder], capture_output=True, text=True, check=False)
+        return run.returncode, run.stdout
+
+
+class CheckLayers(unittest.TestCase):
+    def test_passes_a_sound_tree(self):
+        code, report = check(SOUND)
+        self.assertEqual((code, report), (0, f"check_layers: {len(SOUND)} files, 0 breaches\n"))
+
+    def test_an_empty_tree_is_a_failure(self):
+        self.assertEqual(check({})[0], 1)
+
+    def test_names_every_breach(self):
+        for name, text, words in BREACHES:
+            with self.subTest(file=name, text=text):
+                code, report = check({**SOUND, name: text})
+                self.assertEqual(code, 1, report)
+                self.assertIn(words, report)
+                self.assertIn(name, report)
+
+
+if __name__ == "__main__":
+    unittest.main()
