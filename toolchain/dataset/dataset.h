@@ -113,6 +113,7 @@ class Dataset {
 
   std::string directory_;
   std::vector<CaptureCamera> cameras_;
+  std::vector<std::vector<std::string>> image_files_, mask_files_;  // [V][F] names below the camera's folder
   std::vector<CaptureFrame> frames_;
   std::vector<float> shape_;
   std::vector<std::string> sources_;

@@ -1,0 +1,138 @@
+#include "toolchain/dataset/jpeg.h"
+
+#include <csetjmp>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+// jpeglib.h needs stdio.h before it.
+#include <jpeglib.h>
+
+#include "figurine/check.h"
+#include "toolchain/error.h"
+
+namespace figurine::dataset {
+namespace {
+
+// libjpeg reports errors by a callback that must not return; longjmp is its documented way out. No C++ object may live across the jump, so
+// the functions that call setjmp touch plain data alone.
+struct JpegError {
+  jpeg_error_mgr manager;
+  jmp_buf jump;
+  char message[JMSG_LENGTH_MAX];
+};
+
+void leave_on_error(j_common_ptr info) {
+  auto* error = reinterpret_cast<JpegError*>(info->err);
+  error->manager.format_message(info, error->message);
+  longjmp(error->jump, 1);
+}
+
+// Keeps the first warning's text; the count is in num_warnings.
+void keep_warning(j_common_ptr info, int level) {
+  if (level >= 0) return;
+  auto* error = reinterpret_cast<JpegError*>(info->err);
+  if (error->manager.num_warnings++ == 0) error->manager.format_message(info, error->message);
+}
+
+// Reads the header, then calls prepare(header) for a buffer of width * height * 3 bytes; a null buffer stops there.
+bool run_decoder(std::span<const std::byte> bytes, ImageSize* header, uint8_t* (*prepare)(void*, const ImageSize&), void* context,
+                 JpegError* error) {
+  jpeg_decompress_struct info;
+  std::memset(&info, 0, sizeof info);
+  info.err = jpeg_std_error(&error->manager);
+  error->manager.error_exit = leave_on_error;
+  error->manager.emit_message = keep_warning;
+  error->message[0] = '\0';
+  if (setjmp(error->jump) != 0) {
+    jpeg_destroy_decompress(&info);
+    return false;
+  }
+  jpeg_create_decompress(&info);
+  jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<unsigned long>(bytes.size()));
+  jpeg_read_header(&info, TRUE);
+  header->width_px = info.image_width;
+  header->height_px = info.image_height;
+  uint8_t* buffer = prepare(context, *header);
+  if (buffer != nullptr) {
+    info.out_color_space = JCS_RGB;
+    info.dct_method = JDCT_ISLOW;
+    jpeg_start_decompress(&info);
+    while (info.output_scanline < info.output_height) {
+      JSAMPROW row = buffer + size_t{info.output_scanline} * info.output_width * 3;
+      jpeg_read_scanlines(&info, &row, 1);
+    }
+    jpeg_finish_decompress(&info);
+  }
+  const bool sound = error->manager.num_warnings == 0;
+  jpeg_destroy_decompress(&info);
+  return sound;
+}
+
+ports::ImageU8 decode(std::span<const std::byte> bytes, bool header_only, const std::string& name) {
+  if (bytes.empty()) throw InputError(name + ": empty file, not a JPEG");
+  struct Target {
+    ports::ImageU8 image;
+    bool header_only;
+    bool too_large = false;
+  } target{{}, header_only};
+  target.image.channels = 3;
+  ImageSize header;
+  JpegError error;
+  const auto prepare = [](void* context, const ImageSize& h) -> uint8_t* {
+    auto* t = static_cast<Target*>(context);
+    t->image.width_px = h.width_px;
+    t->image.height_px = h.height_px;
+    t->too_large = h.width_px > kMaxImageSide || h.height_px > kMaxImageSide;
+    if (t->header_only || t->too_large) return nullptr;
+    t->image.pixels.resize(size_t{h.width_px} * h.height_px * 3);
+    return t->image.pixels.data();
+  };
+  const bool sound = run_decoder(bytes, &header, prepare, &target, &error);
+  if (!sound) throw InputError(name + ": damaged JPEG: " + error.message);
+  if (target.too_large) throw InputError(name + ": image larger than " + std::to_string(kMaxImageSide) + " pixels a side");
+  return std::move(target.image);
+}
+
+}  // namespace
+
+ports::ImageU8 decode_jpeg(std::span<const std::byte> bytes, const std::string& name) { return decode(bytes, false, name); }
+
+ImageSize decode_jpeg_size(std::span<const std::byte> bytes, const std::string& name) {
+  const ports::ImageU8 header = decode(bytes, true, name);
+  return {header.width_px, header.height_px};
+}
+
+std::vector<std::byte> encode_jpeg(const ports::ImageU8& image, int quality) {
+  FIG_CHECK(image.sound() && image.channels == 3, "a JPEG is written from RGB");
+  jpeg_compress_struct info;
+  std::memset(&info, 0, sizeof info);
+  jpeg_error_mgr error;
+  info.err = jpeg_std_error(&error);  // an error here is out of memory: the default handler ends the program
+  jpeg_create_compress(&info);
+  unsigned char* buffer = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&info, &buffer, &size);
+  info.image_width = image.width_px;
+  info.image_height = image.height_px;
+  info.input_components = 3;
+  info.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&info);
+  jpeg_set_quality(&info, quality, TRUE);
+  info.dct_method = JDCT_ISLOW;
+  info.optimize_coding = TRUE;
+  for (int c = 0; c < info.num_components; ++c) info.comp_info[c].h_samp_factor = info.comp_info[c].v_samp_factor = 1;
+  jpeg_start_compress(&info, TRUE);
+  while (info.next_scanline < info.image_height) {
+    JSAMPROW row = const_cast<uint8_t*>(image.at(0, info.next_scanline));
+    jpeg_write_scanlines(&info, &row, 1);
+  }
+  jpeg_finish_compress(&info);
+  jpeg_destroy_compress(&info);
+  const auto* begin = reinterpret_cast<const std::byte*>(buffer);
+  std::vector<std::byte> bytes(begin, begin + size);
+  std::free(buffer);
+  return bytes;
+}
+
+}  // namespace figurine::dataset
