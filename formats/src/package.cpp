@@ -1,0 +1,168 @@
+#include "figurine/package.h"
+
+#include <algorithm>
+#include <variant>
+
+#include "formats/src/package_content.h"
+
+namespace figurine {
+
+const char* to_string(PackageKind kind) {
+  switch (kind) {
+    case PackageKind::kBody:
+      return "body";
+    case PackageKind::kAvatar:
+      return "avatar";
+    case PackageKind::kMotion:
+      return "motion";
+  }
+  return "unknown";
+}
+
+const char* to_string(DataType type) {
+  switch (type) {
+    case DataType::kF32:
+      return "f32";
+    case DataType::kU8:
+      return "u8";
+    case DataType::kI16:
+      return "i16";
+    case DataType::kU32:
+      return "u32";
+  }
+  return "unknown";
+}
+
+size_t size_bytes(DataType type) {
+  switch (type) {
+    case DataType::kU8:
+      return 1;
+    case DataType::kI16:
+      return 2;
+    case DataType::kF32:
+    case DataType::kU32:
+      return 4;
+  }
+  return 0;
+}
+
+struct Package::Contents {
+  layout::Header header;
+  std::array<uint64_t, 2> content_hash{0, 0};
+  std::variant<Body, Avatar, Motion> content;
+  Budget budget;
+  Provenance provenance;
+  std::vector<TensorInfo> tensors;
+};
+
+Package::Package(std::unique_ptr<Contents> contents) : contents_(std::move(contents)) {}
+Package::Package(Package&&) noexcept = default;
+Package& Package::operator=(Package&&) noexcept = default;
+Package::~Package() = default;
+
+Result<Package> Package::open(std::span<const std::byte> bytes, const std::string& name) {
+  const Result<Container> container = open_container(bytes);
+  if (!container.ok()) return container.status().within(name);
+
+  auto contents = std::make_unique<Contents>();
+  contents->header = container->header;
+  contents->content_hash = container->content_hash;
+  const auto read = [&]() -> Status {
+    const schema::Index& index = *container->index;
+    FIG_RETURN_IF_ERROR(read_conventions(*index.conventions()));
+    contents->budget = {.peak_memory_bytes = index.budget()->peak_memory_bytes(),
+                        .macs_per_frame = index.budget()->macs_per_frame(),
+                        .gaussians = index.budget()->gaussians()};
+    FIG_RETURN_IF_ERROR(read_provenance(*index.provenance(), contents->provenance));
+    BlobReader blobs(container->blobs);
+    switch (static_cast<PackageKind>(container->header.kind)) {
+      case PackageKind::kBody:
+        FIG_RETURN_IF_ERROR(read_body(index, blobs, contents->content.emplace<Body>()));
+        break;
+      case PackageKind::kAvatar:
+        FIG_RETURN_IF_ERROR(read_avatar(index, blobs, contents->budget, contents->content.emplace<Avatar>()));
+        break;
+      case PackageKind::kMotion:
+        FIG_RETURN_IF_ERROR(read_motion(index, blobs, contents->content.emplace<Motion>()));
+        break;
+    }
+    return blobs.check_all_known();
+  };
+  if (const Status status = read(); !status.ok()) return status.within(name);
+  for (const BlobView& blob : container->blobs) contents->tensors.push_back(blob.info);
+  return Package(std::move(contents));
+}
+
+PackageKind Package::kind() const { return static_cast<PackageKind>(contents_->header.kind); }
+uint32_t Package::version() const { return contents_->header.version; }
+uint64_t Package::required_features() const { return contents_->header.required_features; }
+uint64_t Package::optional_features() const { return contents_->header.optional_features; }
+std::array<uint64_t, 2> Package::content_hash() const { return contents_->content_hash; }
+const Budget& Package::budget() const { return contents_->budget; }
+const Provenance& Package::provenance() const { return contents_->provenance; }
+const std::vector<TensorInfo>& Package::tensors() const { return contents_->tensors; }
+uint64_t Package::size_bytes() const { return contents_->header.file_bytes; }
+
+const Body& Package::body() const {
+  FIG_CHECK(kind() == PackageKind::kBody, "the package is not a body");
+  return *std::get_if<Body>(&contents_->content);
+}
+
+const Avatar& Package::avatar() const {
+  FIG_CHECK(kind() == PackageKind::kAvatar, "the package is not an avatar");
+  return *std::get_if<Avatar>(&contents_->content);
+}
+
+const Motion& Package::motion() const {
+  FIG_CHECK(kind() == PackageKind::kMotion, "the package is not a motion");
+  return *std::get_if<Motion>(&contents_->content);
+}
+
+std::string format_hash(const std::array<uint64_t, 2>& hash) {
+  std::string digits;
+  for (const uint64_t half : {hash[1], hash[0]}) {
+    for (int shift = 60; shift >= 0; shift -= 4) digits += "0123456789abcdef"[half >> shift & 15];
+  }
+  return digits;
+}
+
+Status check_avatar_fits_body(const Avatar& avatar, const Package& package) {
+  const auto mismatch = [&](const std::string& why) {
+    return Status(StatusCode::kMismatch, "avatar '" + avatar.name + "' does not fit the body: " + why);
+  };
+  if (package.kind() != PackageKind::kBody) return mismatch(std::string("the other package is of kind ") + to_string(package.kind()));
+  const Body& body = package.body();
+  if (avatar.body_hash != package.content_hash()) {
+    return mismatch("made for '" + avatar.body_name + "' " + format_hash(avatar.body_hash) + ", this is '" + body.name + "' " +
+                    format_hash(package.content_hash()));
+  }
+  if (avatar.network.input_size != body.uv_size) {
+    return mismatch("its map has " + std::to_string(avatar.network.input_size) + " texels a side, the body's " +
+                    std::to_string(body.uv_size));
+  }
+  if (avatar.shape.size() > body.shape_count()) {
+    return mismatch("it has " + std::to_string(avatar.shape.size()) + " shape coefficients, the body " +
+                    std::to_string(body.shape_count()));
+  }
+  if (!avatar.golden.rotations.empty() && avatar.golden.rotations.size() != size_t{body.joint_count()} * 4) {
+    return mismatch("its golden pose has " + std::to_string(avatar.golden.rotations.size() / 4) + " joints, the body " +
+                    std::to_string(body.joint_count()));
+  }
+  for (uint8_t joint : avatar.pose_statistics.joints) {
+    if (joint >= body.joint_count()) return mismatch("its pose statistics name joint " + std::to_string(joint));
+  }
+  return {};
+}
+
+Status check_motion_fits_body(const Motion& motion, const Body& body) {
+  if (motion.joint_names.size() != body.joint_names.size()) {
+    return Status(StatusCode::kMismatch, "motion '" + motion.name + "' has " + std::to_string(motion.joint_names.size()) +
+                                             " joints, body '" + body.name + "' has " + std::to_string(body.joint_names.size()));
+  }
+  const auto [theirs, ours] = std::mismatch(motion.joint_names.begin(), motion.joint_names.end(), body.joint_names.begin());
+  if (theirs == motion.joint_names.end()) return {};
+  return Status(StatusCode::kMismatch, "motion '" + motion.name + "': joint " + std::to_string(theirs - motion.joint_names.begin()) +
+                                           " is '" + *theirs + "', body '" + body.name + "' has '" + *ours + "'");
+}
+
+}  // namespace figurine

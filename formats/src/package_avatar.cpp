@@ -1,0 +1,210 @@
+// The meaning of an avatar package: a network whose shapes fit its weights and its head, parameters that decode to sound Gaussians, a pose
+// distribution that can be inverted, a golden frame that can be drawn.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "figurine/gaussian.h"
+#include "formats/src/package_content.h"
+
+namespace figurine {
+
+namespace {
+
+Status read_map_statistics(const schema::MapStatistics& table, MapStatistics& out) {
+  for (uint32_t c = 0; c < kMapChannels; ++c) {
+    out.mean[c] = table.mean()->Get(c);
+    out.scale[c] = table.scale()->Get(c);
+    const std::string at = "channel " + std::to_string(c) + ": ";
+    if (!(std::fabs(out.mean[c]) <= layout::kMaxLengthM))
+      return corrupt("avatar.map_statistics", at + "the mean is not finite or too large");
+    if (!(out.scale[c] > 0 && out.scale[c] <= 1e6f))
+      return corrupt("avatar.map_statistics", at + "the scale is not positive, or too large");
+  }
+  return {};
+}
+
+Status read_decoding(const schema::HeadDecoding& table, HeadDecoding& out) {
+  out = {.offset_scale_m = table.offset_scale_m(),
+         .spacing_scale = table.spacing_scale(),
+         .max_log_scale = table.max_log_scale(),
+         .opacity_bias = table.opacity_bias(),
+         .sh_degree = table.sh_degree()};
+  const auto within = [](float value, float max) { return value > 0 && value <= max; };
+  if (!within(out.offset_scale_m, 10)) return corrupt("avatar.decoding.offset_scale_m", "is not above 0 and at most 10");
+  if (!within(out.spacing_scale, 100)) return corrupt("avatar.decoding.spacing_scale", "is not above 0 and at most 100");
+  if (!within(out.max_log_scale, 20)) return corrupt("avatar.decoding.max_log_scale", "is not above 0 and at most 20");
+  if (!(std::fabs(out.opacity_bias) <= 100)) return corrupt("avatar.decoding.opacity_bias", "is not within -100 and 100");
+  if (out.sh_degree > kMaxShDegree) return corrupt("avatar.decoding.sh_degree", "is above " + std::to_string(kMaxShDegree));
+  return {};
+}
+
+// Shapes first, from the layer list alone: they say how large each weight blob has to be.
+Status read_network(const schema::Network& table, BlobReader& blobs, Network& out) {
+  out.input_size = table.input_size();
+  out.input_channels = table.input_channels();
+  if (table.layers()->size() > kMaxLayers)
+    return Status(StatusCode::kLimitExceeded, "network: more than " + std::to_string(kMaxLayers) + " layers");
+  for (const schema::Layer* entry : *table.layers()) {
+    out.layers.push_back({.op = static_cast<LayerOp>(entry->op()),
+                          .inputs = {entry->input_a(), entry->input_b()},
+                          .out_channels = entry->out_channels(),
+                          .kernel = entry->kernel(),
+                          .relu = entry->relu()});
+  }
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(out, false);
+  if (!shapes.ok()) return shapes.status();
+  for (size_t i = 0; i < out.layers.size(); ++i) {
+    Layer& layer = out.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    const std::string name = "network." + std::to_string(i);
+    const uint32_t in_channels = (*shapes)[layer.inputs[0]].channels;
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, layer.weights));
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, layer.bias));
+    FIG_RETURN_IF_ERROR(check_magnitude(layer.weights, name + ".weights", std::numeric_limits<float>::max()));
+    FIG_RETURN_IF_ERROR(check_magnitude(layer.bias, name + ".bias", std::numeric_limits<float>::max()));
+  }
+  return infer_shapes(out, true).status();
+}
+
+Status check_network_fits(const Avatar& avatar, const Budget& budget) {
+  const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, true);
+  if (avatar.network.input_size > kMaxUvSize) {
+    return Status(StatusCode::kLimitExceeded, "network.input_size: is larger than " + std::to_string(kMaxUvSize));
+  }
+  if (avatar.fourier_octaves > layout::kMaxFourierOctaves) {
+    return Status(StatusCode::kLimitExceeded, "avatar.fourier_octaves: is above " + std::to_string(layout::kMaxFourierOctaves));
+  }
+  if (const uint32_t channels = kMapChannels + 4 * avatar.fourier_octaves; avatar.network.input_channels != channels) {
+    return corrupt("network.input_channels",
+                   "is " + std::to_string(avatar.network.input_channels) + ", maps and Fourier channels make " + std::to_string(channels));
+  }
+  if (shapes.back().size != avatar.network.input_size) return corrupt("network", "the result does not have the size of the input");
+  if (const uint32_t channels = head_channels(avatar.decoding.sh_degree); shapes.back().channels != channels) {
+    return corrupt("network",
+                   "the result has " + std::to_string(shapes.back().channels) + " channels, the head needs " + std::to_string(channels));
+  }
+  uint64_t largest_value = 0;
+  for (const ValueShape& shape : shapes) {
+    largest_value = std::max(largest_value, uint64_t{shape.size} * shape.size * shape.channels * sizeof(float));
+  }
+  if (largest_value > layout::kMaxValueBytes) return Status(StatusCode::kLimitExceeded, "network: an activation is larger than 1 GiB");
+  if (budget.peak_memory_bytes != 0 && largest_value > budget.peak_memory_bytes) {
+    return Status(StatusCode::kLimitExceeded, "budget.peak_memory_bytes: declares " + std::to_string(budget.peak_memory_bytes) +
+                                                  ", one activation alone needs " + std::to_string(largest_value));
+  }
+  if (const uint64_t macs = count_macs(avatar.network, shapes); budget.macs_per_frame != 0 && macs > budget.macs_per_frame) {
+    return Status(StatusCode::kLimitExceeded, "budget.macs_per_frame: declares " + std::to_string(budget.macs_per_frame) +
+                                                  ", the network needs " + std::to_string(macs));
+  }
+  if (budget.gaussians > uint64_t{avatar.network.input_size} * avatar.network.input_size) {
+    return corrupt("budget.gaussians", "is more than the map has texels");
+  }
+  return {};
+}
+
+// Cholesky in double: succeeds exactly if the matrix is positive definite beyond rounding.
+bool is_positive_definite(std::span<const float> matrix, size_t n) {
+  std::vector<double> lower(n * n, 0.0);
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = 0; j <= i; ++j) {
+      double sum = matrix[i * n + j];
+      for (size_t k = 0; k < j; ++k) sum -= lower[i * n + k] * lower[j * n + k];
+      if (i == j && !(sum > 0)) return false;
+      lower[i * n + j] = i == j ? std::sqrt(sum) : sum / lower[j * n + j];
+    }
+  }
+  return true;
+}
+
+Status read_pose_statistics(const schema::PoseStatistics& table, BlobReader& blobs, PoseStatistics& out) {
+  const auto& joints = *table.joints();
+  if (joints.size() < 1 || joints.size() > kMaxJoints) return corrupt("avatar.pose_statistics.joints", "does not list 1 to 255 joints");
+  out.joints.assign(joints.begin(), joints.end());
+  std::vector<uint8_t> sorted = out.joints;
+  std::sort(sorted.begin(), sorted.end());
+  if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
+    return corrupt("avatar.pose_statistics.joints", "lists a joint twice");
+  const uint32_t n = joints.size() * 3;
+  FIG_RETURN_IF_ERROR(blobs.read("pose.mean", {n}, out.mean));
+  FIG_RETURN_IF_ERROR(blobs.read("pose.covariance", {n, n}, out.covariance));
+  FIG_RETURN_IF_ERROR(check_magnitude(out.mean, "pose.mean", 100));
+  FIG_RETURN_IF_ERROR(check_magnitude(out.covariance, "pose.covariance", 1e4f));
+  for (size_t i = 0; i < n; ++i) {
+    if (!(out.covariance[i * n + i] > 0)) return corrupt("pose.covariance", "row " + std::to_string(i) + ": the variance is not positive");
+    for (size_t j = 0; j < i; ++j) {
+      const float a = out.covariance[i * n + j], b = out.covariance[j * n + i];
+      if (std::fabs(a - b) > 1e-6f * std::max(std::fabs(a), std::fabs(b))) {
+        return corrupt("pose.covariance", "is not symmetric in row " + std::to_string(i) + ", column " + std::to_string(j));
+      }
+    }
+  }
+  return is_positive_definite(out.covariance, n) ? Status() : corrupt("pose.covariance", "is not positive definite");
+}
+
+// The image's size stands in the first chunk of every PNG.
+Status check_png(std::span<const uint8_t> png, const Camera& camera) {
+  constexpr uint8_t kStart[16] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
+  if (png.size() < 33 || std::memcmp(png.data(), kStart, sizeof(kStart)) != 0) return corrupt("golden.png", "is not a PNG file");
+  const auto big_endian = [&](size_t i) {
+    return uint32_t{png[i]} << 24 | uint32_t{png[i + 1]} << 16 | uint32_t{png[i + 2]} << 8 | uint32_t{png[i + 3]};
+  };
+  if (big_endian(16) != camera.width_px || big_endian(20) != camera.height_px)
+    return corrupt("golden.png", "does not have the golden camera's size");
+  return {};
+}
+
+Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFrame& out) {
+  const auto vec3 = [](const schema::Vec3& v) { return std::array<float, 3>{v.x(), v.y(), v.z()}; };
+  out.root_translation_m = vec3(*table.root_translation_m());
+  out.background = vec3(*table.background());
+  const schema::Camera& camera = *table.camera();
+  out.camera = {.width_px = camera.width_px(),
+                .height_px = camera.height_px(),
+                .fx_px = camera.fx_px(),
+                .fy_px = camera.fy_px(),
+                .cx_px = camera.cx_px(),
+                .cy_px = camera.cy_px(),
+                .near_m = camera.near_m()};
+  for (uint32_t i = 0; i < 12; ++i) out.camera.view_from_world[i] = camera.view_from_world()->Get(i);
+  if (const Status status = validate_camera(out.camera); !status.ok()) return corrupt("golden", status.message());
+  for (float channel : out.background) {
+    if (!(channel >= 0 && channel <= 1)) return corrupt("golden.background", "is not within 0 and 1");
+  }
+  FIG_RETURN_IF_ERROR(blobs.read("golden.rotations", {BlobReader::kAny, 4}, out.rotations));
+  const size_t joints = out.rotations.size() / 4;
+  if (joints > kMaxJoints) return corrupt("golden.rotations", "has more than 255 joints");
+  if (const Status status = validate_pose({out.root_translation_m, out.rotations}, static_cast<uint32_t>(joints)); !status.ok()) {
+    return corrupt("golden", status.message());
+  }
+  FIG_RETURN_IF_ERROR(blobs.read("golden.png", {BlobReader::kAny}, out.png, BlobReader::kMayBeAbsent));
+  return out.png.empty() ? Status() : check_png(out.png, out.camera);
+}
+
+}  // namespace
+
+Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& budget, Avatar& out) {
+  const schema::Avatar& table = *index.content_as_Avatar();
+  FIG_RETURN_IF_ERROR(read_text(index.name(), "avatar.name", layout::kMaxNameBytes, out.name));
+  FIG_RETURN_IF_ERROR(read_text(table.body_name(), "avatar.body_name", layout::kMaxNameBytes, out.body_name));
+  FIG_RETURN_IF_ERROR(read_text(table.preset(), "avatar.preset", layout::kMaxNameBytes, out.preset));
+  out.body_hash = {table.body_hash_low(), table.body_hash_high()};
+  if (table.template_mode() > schema::TemplateMode::MAX) return Status(StatusCode::kUnsupported, "avatar.template_mode: is unknown");
+  out.template_mode = static_cast<TemplateMode>(table.template_mode());
+  FIG_RETURN_IF_ERROR(blobs.read("avatar.shape", {BlobReader::kAny}, out.shape, BlobReader::kMayBeAbsent));
+  if (out.shape.size() > kMaxShapeCoefficients) {
+    return Status(StatusCode::kLimitExceeded, "avatar.shape: has more than " + std::to_string(kMaxShapeCoefficients) + " coefficients");
+  }
+  FIG_RETURN_IF_ERROR(check_magnitude(out.shape, "avatar.shape", 1000));
+  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), out.map_statistics));
+  out.fourier_octaves = table.fourier_octaves();
+  FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), out.decoding));
+  FIG_RETURN_IF_ERROR(read_network(*table.network(), blobs, out.network));
+  FIG_RETURN_IF_ERROR(check_network_fits(out, budget));
+  if (table.pose_statistics() != nullptr) FIG_RETURN_IF_ERROR(read_pose_statistics(*table.pose_statistics(), blobs, out.pose_statistics));
+  if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden(*table.golden(), blobs, out.golden));
+  return {};
+}
+
+}  // namespace figurine

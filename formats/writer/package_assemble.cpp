@@ -1,0 +1,134 @@
+// Parts to bytes. The index is built twice: once to learn its size, which the blobs' places follow from, and once with those places in it
+// (extents are structs, so its size does not depend on them).
+#include <cstring>
+
+#include "formats/src/checksum.h"
+#include "formats/src/package_layout.h"
+#include "formats/writer/package_parts.h"
+#include "package_generated.h"
+
+namespace figurine {
+
+namespace {
+
+using flatbuffers::FlatBufferBuilder;
+using flatbuffers::Offset;
+
+template <class Entry, class Build>
+auto build_list(FlatBufferBuilder& builder, const std::vector<Entry>& entries, Build build) {
+  std::vector<decltype(build(entries[0]))> offsets;
+  for (const Entry& entry : entries) offsets.push_back(build(entry));
+  return builder.CreateVector(offsets);
+}
+
+Offset<schema::Provenance> build_provenance(FlatBufferBuilder& b, const Provenance& p) {
+  const auto text = [&](const std::string& value) { return b.CreateString(value); };
+  const auto tool = text(p.tool), created = text(p.created);
+  const auto settings =
+      build_list(b, p.settings, [&](const KeyValue& entry) { return schema::CreateSetting(b, text(entry.key), text(entry.value)); });
+  const auto sources = build_list(b, p.sources, text);
+  const auto quality =
+      build_list(b, p.quality, [&](const QualityMetric& entry) { return schema::CreateQualityMetric(b, text(entry.name), entry.value); });
+  const auto licence_name = text(p.licence_name), licence_url = text(p.licence_url);
+  const auto authors = build_list(b, p.authors, text);
+  const auto avatar_permission = text(p.avatar_permission), commercial_usage = text(p.commercial_usage), person = text(p.depicted_person);
+  return schema::CreateProvenance(b, tool, created, settings, sources, quality, licence_name, licence_url, authors, avatar_permission,
+                                  commercial_usage, person);
+}
+
+Offset<void> build_content(FlatBufferBuilder& b, const Body& body) {
+  const auto names = build_list(b, body.joint_names, [&](const std::string& name) { return b.CreateString(name); });
+  return schema::CreateBody(b, body.uv_size, names).Union();
+}
+
+Offset<void> build_content(FlatBufferBuilder& b, const Motion& motion) {
+  const auto names = build_list(b, motion.joint_names, [&](const std::string& name) { return b.CreateString(name); });
+  return schema::CreateMotion(b, motion.frames_per_second, names).Union();
+}
+
+Offset<schema::GoldenFrame> build_golden(FlatBufferBuilder& b, const GoldenFrame& golden) {
+  if (golden.rotations.empty()) return 0;
+  const Camera& c = golden.camera;
+  const schema::Camera camera(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.near_m,
+                              flatbuffers::span<const float, 12>(c.view_from_world.data(), 12));
+  const auto vec3 = [](const std::array<float, 3>& v) { return schema::Vec3(v[0], v[1], v[2]); };
+  const schema::Vec3 translation = vec3(golden.root_translation_m), background = vec3(golden.background);
+  return schema::CreateGoldenFrame(b, &translation, &camera, &background);
+}
+
+Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
+  const auto body_name = b.CreateString(avatar.body_name), preset = b.CreateString(avatar.preset);
+  const schema::MapStatistics statistics(flatbuffers::span<const float, 6>(avatar.map_statistics.mean.data(), 6),
+                                         flatbuffers::span<const float, 6>(avatar.map_statistics.scale.data(), 6));
+  const HeadDecoding& d = avatar.decoding;
+  const auto decoding = schema::CreateHeadDecoding(b, d.offset_scale_m, d.spacing_scale, d.max_log_scale, d.opacity_bias, d.sh_degree);
+  const auto layers = build_list(b, avatar.network.layers, [&](const Layer& layer) {
+    return schema::CreateLayer(b, static_cast<schema::LayerOp>(layer.op), layer.inputs[0], layer.inputs[1], layer.out_channels,
+                               layer.kernel, layer.relu);
+  });
+  const auto network = schema::CreateNetwork(b, avatar.network.input_size, avatar.network.input_channels, layers);
+  Offset<schema::PoseStatistics> pose_statistics = 0;
+  if (!avatar.pose_statistics.joints.empty()) {
+    pose_statistics = schema::CreatePoseStatistics(b, b.CreateVector(avatar.pose_statistics.joints));
+  }
+  const auto golden = build_golden(b, avatar.golden);
+  return schema::CreateAvatar(b, body_name, avatar.body_hash[0], avatar.body_hash[1], preset,
+                              static_cast<schema::TemplateMode>(avatar.template_mode), &statistics, avatar.fourier_octaves, decoding,
+                              network, pose_statistics, golden)
+      .Union();
+}
+
+void build_index(FlatBufferBuilder& b, const PackageParts& parts, const std::vector<schema::Extent>& extents) {
+  const auto name = std::visit([&](const auto* content) { return b.CreateString(content->name); }, parts.content);
+  const schema::Conventions conventions(schema::LengthUnit::Metre, schema::Axes::RightHandedYUp,
+                                        schema::ColourSpace::SrgbEncodedStraightAlpha, schema::RotationFormat::QuaternionWxyz,
+                                        schema::RestFrames::WorldAligned);
+  const auto budget = schema::CreateBudget(b, parts.budget.peak_memory_bytes, parts.budget.macs_per_frame, parts.budget.gaussians);
+  const auto provenance = build_provenance(b, parts.provenance);
+  const auto content = std::visit([&](const auto* described) { return build_content(b, *described); }, parts.content);
+  std::vector<Offset<schema::Blob>> blobs;
+  for (size_t i = 0; i < parts.blobs.size(); ++i) {
+    const BlobPart& part = parts.blobs[i];
+    const auto blob_name = b.CreateString(part.name);
+    const auto shape = b.CreateVector(part.shape);
+    blobs.push_back(schema::CreateBlob(b, blob_name, part.optional, static_cast<schema::ElementType>(part.type), shape, &extents[i]));
+  }
+  const auto content_type = static_cast<schema::Content>(parts.content.index() + 1);
+  b.Finish(schema::CreateIndex(b, name, &conventions, budget, provenance, content_type, content, b.CreateVector(blobs)));
+}
+
+}  // namespace
+
+std::vector<std::byte> assemble(const PackageParts& parts) {
+  std::vector<schema::Extent> extents(parts.blobs.size());
+  FlatBufferBuilder sized, placed;
+  build_index(sized, parts, extents);
+  uint64_t cursor = kPackageHeaderBytes + sized.GetSize();
+  for (size_t i = 0; i < extents.size(); ++i) {
+    const std::span<const std::byte> blob = parts.blobs[i].bytes;
+    extents[i] = schema::Extent(layout::align_up(cursor), blob.size(), xxh3_64(blob));
+    cursor = extents[i].offset() + blob.size();
+  }
+  build_index(placed, parts, extents);
+  FIG_CHECK(placed.GetSize() == sized.GetSize(), "the index has one size");
+
+  std::vector<std::byte> bytes(layout::align_up(cursor), std::byte{0});
+  const std::span<const std::byte> index(reinterpret_cast<const std::byte*>(placed.GetBufferPointer()), placed.GetSize());
+  std::memcpy(bytes.data() + kPackageHeaderBytes, index.data(), index.size());
+  for (size_t i = 0; i < extents.size(); ++i) {
+    if (!parts.blobs[i].bytes.empty())
+      std::memcpy(bytes.data() + extents[i].offset(), parts.blobs[i].bytes.data(), parts.blobs[i].bytes.size());
+  }
+  layout::Header header{.kind = static_cast<uint32_t>(parts.kind),
+                        .required_features = parts.required_features,
+                        .optional_features = parts.optional_features,
+                        .file_bytes = bytes.size(),
+                        .index_bytes = static_cast<uint32_t>(index.size()),
+                        .index_checksum = xxh3_64(index)};
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  header.header_checksum = xxh3_64(std::span<const std::byte>(bytes).first(layout::kSealedHeaderBytes));
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  return bytes;
+}
+
+}  // namespace figurine

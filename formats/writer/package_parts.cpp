@@ -1,0 +1,106 @@
+#include "formats/writer/package_parts.h"
+
+#include <limits>
+
+namespace figurine {
+
+namespace {
+
+// Collects blobs and the first array whose length does not fit its shape.
+class PartList {
+ public:
+  explicit PartList(std::vector<BlobPart>& blobs) : blobs_(blobs) {}
+
+  // inner: the trailing lengths of the shape; the first one follows from the array. Empty arrays make no blob.
+  template <class T>
+  void add(const std::string& name, std::span<const T> values, const std::vector<uint32_t>& inner = {}, size_t expected_first = 0) {
+    if (values.empty() && expected_first == 0) return;
+    uint64_t row = 1;
+    for (uint32_t length : inner) row *= length;
+    const uint64_t first = row == 0 ? 0 : values.size() / row;
+    const bool fits = row != 0 && first * row == values.size() && first <= std::numeric_limits<uint32_t>::max();
+    if (!fits || (expected_first != 0 && first != expected_first)) {
+      if (status_.ok()) {
+        status_ = Status(StatusCode::kInvalidArgument,
+                         name + ": has " + std::to_string(values.size()) + " values, rows of " + std::to_string(row) +
+                             (expected_first != 0 ? ", needs " + std::to_string(expected_first) + " rows" : ""));
+      }
+      return;
+    }
+    BlobPart part{.name = name, .type = type_of(T{}), .shape = {static_cast<uint32_t>(first)}, .bytes = std::as_bytes(values)};
+    part.shape.insert(part.shape.end(), inner.begin(), inner.end());
+    blobs_.push_back(std::move(part));
+  }
+
+  const Status& status() const { return status_; }
+
+ private:
+  static DataType type_of(float) { return DataType::kF32; }
+  static DataType type_of(uint8_t) { return DataType::kU8; }
+  static DataType type_of(int16_t) { return DataType::kI16; }
+  static DataType type_of(uint32_t) { return DataType::kU32; }
+
+  std::vector<BlobPart>& blobs_;
+  Status status_;
+};
+
+}  // namespace
+
+Result<PackageParts> take_apart(const Body& body, const Provenance& provenance) {
+  PackageParts parts{.kind = PackageKind::kBody, .content = &body, .provenance = provenance};
+  parts.budget.gaussians = body.texel_count();
+  const uint32_t joints = body.joint_count(), texels = body.texel_count();
+  PartList list(parts.blobs);
+  list.add("body.parents", body.parents, {}, body.joint_names.size());
+  list.add("body.joint_position", body.joint_position_m, {3}, joints);
+  list.add("body.joint_shape_basis", body.joint_shape_basis_m, {joints, 3});
+  list.add("body.texel", body.texel);
+  list.add("body.texel_position", body.texel_position_m, {3}, texels);
+  list.add("body.texel_normal", body.texel_normal, {3}, texels);
+  list.add("body.texel_joints", body.texel_joints, {kSkinInfluences}, texels);
+  list.add("body.texel_weights", body.texel_weights, {kSkinInfluences}, texels);
+  list.add("body.texel_spacing", body.texel_spacing_m, {}, texels);
+  list.add("body.texel_shape_basis", body.texel_shape_basis_m, {texels, 3});
+  list.add("body.border_texel", body.border_texel);
+  list.add("body.border_source", body.border_source, {}, body.border_texel.size());
+  if (!list.status().ok()) return list.status();
+  return parts;
+}
+
+Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget, const Provenance& provenance) {
+  PackageParts parts{.kind = PackageKind::kAvatar, .content = &avatar, .budget = budget, .provenance = provenance};
+  // The list's shapes say how the weights are laid out; their number is checked against them here, their values by the reader.
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, true);
+  if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
+  PartList list(parts.blobs);
+  list.add("avatar.shape", avatar.shape);
+  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
+    const Layer& layer = avatar.network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    const std::string name = "network." + std::to_string(i);
+    list.add(name + ".weights", layer.weights, {layer.kernel, layer.kernel, (*shapes)[layer.inputs[0]].channels}, layer.out_channels);
+    list.add(name + ".bias", layer.bias, {}, layer.out_channels);
+  }
+  if (const size_t features = avatar.pose_statistics.joints.size() * 3; features != 0) {
+    list.add("pose.mean", avatar.pose_statistics.mean, {}, features);
+    list.add("pose.covariance", avatar.pose_statistics.covariance, {static_cast<uint32_t>(features)}, features);
+  }
+  list.add("golden.rotations", avatar.golden.rotations, {4});
+  list.add("golden.png", avatar.golden.png);
+  if (!list.status().ok()) return list.status();
+  if (avatar.golden.rotations.empty() && !avatar.golden.png.empty()) {
+    return Status(StatusCode::kInvalidArgument, "golden.png: there is no golden pose for it");
+  }
+  return parts;
+}
+
+Result<PackageParts> take_apart(const Motion& motion, const Provenance& provenance) {
+  PackageParts parts{.kind = PackageKind::kMotion, .content = &motion, .provenance = provenance};
+  PartList list(parts.blobs);
+  list.add("motion.root_translation", motion.root_translation_m, {3}, motion.frame_count);
+  list.add("motion.rotations", motion.rotations, {static_cast<uint32_t>(motion.joint_names.size()), 4}, motion.frame_count);
+  if (!list.status().ok()) return list.status();
+  return parts;
+}
+
+}  // namespace figurine

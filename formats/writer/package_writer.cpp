@@ -1,0 +1,39 @@
+#include "formats/writer/package_writer.h"
+
+#include <cstring>
+
+#include "formats/writer/package_parts.h"
+
+namespace figurine {
+
+namespace {
+
+// Nothing leaves the writer that the reader would refuse.
+Result<std::vector<std::byte>> assemble_and_verify(Result<PackageParts> parts, const std::string& name) {
+  if (!parts.ok()) return parts.status().within(name);
+  std::vector<std::byte> bytes = assemble(*parts);
+  const AlignedBytes copy(bytes);
+  if (const Result<Package> opened = Package::open(copy.bytes(), name); !opened.ok()) return opened.status();
+  return bytes;
+}
+
+}  // namespace
+
+AlignedBytes::AlignedBytes(std::span<const std::byte> source) : storage_(source.size() + kBlobAlignment), size_(source.size()) {
+  skip_ = (kBlobAlignment - reinterpret_cast<uintptr_t>(storage_.data()) % kBlobAlignment) % kBlobAlignment;
+  if (!source.empty()) std::memcpy(storage_.data() + skip_, source.data(), source.size());
+}
+
+Result<std::vector<std::byte>> write_package(const Body& body, const Provenance& provenance) {
+  return assemble_and_verify(take_apart(body, provenance), "body '" + body.name + "'");
+}
+
+Result<std::vector<std::byte>> write_package(const Avatar& avatar, const Budget& budget, const Provenance& provenance) {
+  return assemble_and_verify(take_apart(avatar, budget, provenance), "avatar '" + avatar.name + "'");
+}
+
+Result<std::vector<std::byte>> write_package(const Motion& motion, const Provenance& provenance) {
+  return assemble_and_verify(take_apart(motion, provenance), "motion '" + motion.name + "'");
+}
+
+}  // namespace figurine

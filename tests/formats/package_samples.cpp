@@ -1,0 +1,125 @@
+#include "formats/package_samples.h"
+
+namespace figurine::samples {
+
+namespace {
+
+// Eighths in [-1, 1): a short repeating pattern, exact in binary.
+float pattern(size_t i) { return static_cast<float>(static_cast<int>((i * 7 + 3) % 16) - 8) / 8.0f; }
+
+std::vector<float> patterned(size_t count) {
+  std::vector<float> values(count);
+  for (size_t i = 0; i < count; ++i) values[i] = pattern(i);
+  return values;
+}
+
+// The first 33 bytes of a PNG: signature and header chunk, which is what a package checks of it.
+std::vector<uint8_t> png_start(uint8_t width, uint8_t height) {
+  return {0x89, 'P', 'N',   'G', '\r', '\n', 0x1A,   '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R', 0,
+          0,    0,   width, 0,   0,    0,    height, 8,    2, 0, 0, 0,  0,   0,   0,   0};
+}
+
+}  // namespace
+
+Provenance make_provenance() {
+  return {.tool = "figurine-tests 1",
+          .created = "",
+          .settings = {{"command", "sample --seed 1\nsecond line"}, {"seed", "1"}},
+          .sources = {"none", "m\xC3\xBChelos"},
+          .quality = {{"psnr_pose_db", 31.25}, {"psnr_view_db", 30.5}},
+          .licence_name = "CC0-1.0",
+          .licence_url = "https://creativecommons.org/publicdomain/zero/1.0/",
+          .authors = {"figurine"},
+          .avatar_permission = "everyone",
+          .commercial_usage = "corporation",
+          .depicted_person = "synthetic"};
+}
+
+BodySample::BodySample() {
+  constexpr uint32_t kJoints = 3, kShapes = 2, kTexels = 5, kSize = 8;
+  parents = {-1, 0, 1};
+  joint_position = {0, 1, 0, 0, 1.25f, 0, 0, 1.5f, 0.125f};
+  joint_shape_basis = patterned(kShapes * kJoints * 3);
+  texel = {9, 10, 17, 18, 63};
+  texel_position = patterned(kTexels * 3);
+  for (uint32_t i = 0; i < kTexels; ++i) {
+    const float normal[3] = {i % 3 == 0 ? 1.0f : 0.0f, i % 3 == 1 ? 1.0f : 0.0f, i % 3 == 2 ? -1.0f : 0.0f};
+    texel_normal.insert(texel_normal.end(), normal, normal + 3);
+    const uint8_t joints[kSkinInfluences] = {static_cast<uint8_t>(i % kJoints), 1, 2};
+    texel_joints.insert(texel_joints.end(), joints, joints + kSkinInfluences);
+    const float weights[kSkinInfluences] = {0.5f, 0.375f, 0.125f};
+    texel_weights.insert(texel_weights.end(), weights, weights + kSkinInfluences);
+  }
+  texel_spacing.assign(kTexels, 0.0078125f);
+  texel_shape_basis = patterned(kShapes * kTexels * 3);
+  border_texel = {1, 8, 62};
+  border_source = {0, 0, 4};
+  body = {.name = "sample body",
+          .uv_size = kSize,
+          .joint_names = {"pelvis", "spine1", "head"},
+          .parents = parents,
+          .joint_position_m = joint_position,
+          .joint_shape_basis_m = joint_shape_basis,
+          .texel = texel,
+          .texel_position_m = texel_position,
+          .texel_normal = texel_normal,
+          .texel_joints = texel_joints,
+          .texel_weights = texel_weights,
+          .texel_spacing_m = texel_spacing,
+          .texel_shape_basis_m = texel_shape_basis,
+          .border_texel = border_texel,
+          .border_source = border_source};
+}
+
+AvatarSample::AvatarSample() {
+  avatar.name = "sample avatar";
+  avatar.body_name = "sample body";
+  avatar.body_hash = {0x0123456789abcdefu, 0xfedcba9876543210u};
+  avatar.preset = "none";
+  avatar.template_mode = TemplateMode::kShaped;
+  shape = {0.5f, -1.25f};
+  avatar.shape = shape;
+  avatar.map_statistics = {.mean = {0, 0.125f, 0, 0, 0, 0.25f}, .scale = {2, 2, 2, 1, 1, 0.5f}};
+  avatar.fourier_octaves = 1;
+  avatar.decoding = {.offset_scale_m = 0.0625f, .spacing_scale = 0.5f, .max_log_scale = 3, .opacity_bias = 2, .sh_degree = 1};
+  avatar.network = make_pose_unet(8, kMapChannels + 4, 2, head_channels(1));
+  const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, false);
+  weights.resize(avatar.network.layers.size());
+  biases.resize(avatar.network.layers.size());
+  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
+    Layer& layer = avatar.network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    weights[i] = patterned(size_t{layer.out_channels} * layer.kernel * layer.kernel * shapes[layer.inputs[0]].channels);
+    biases[i] = patterned(layer.out_channels);
+    layer.weights = weights[i];
+    layer.bias = biases[i];
+  }
+  pose_mean = {0.25f, 0, -0.5f};
+  pose_covariance = {0.5f, 0.125f, 0, 0.125f, 0.25f, 0.0625f, 0, 0.0625f, 1};
+  avatar.pose_statistics = {.joints = {2}, .mean = pose_mean, .covariance = pose_covariance};
+  golden_rotations = {1, 0, 0, 0, 0, 1, 0, 0, 0.5f, 0.5f, 0.5f, 0.5f};
+  golden_png = png_start(16, 24);
+  avatar.golden.root_translation_m = {0.25f, 0, -1};
+  avatar.golden.rotations = golden_rotations;
+  avatar.golden.camera = {.width_px = 16, .height_px = 24, .fx_px = 20, .fy_px = 21, .cx_px = 8, .cy_px = 12.5f, .near_m = 0.125f};
+  avatar.golden.camera.view_from_world = {0, 0, 1, 0.5f, 1, 0, 0, 0.25f, 0, 1, 0, 3};
+  avatar.golden.background = {0.5f, 0.25f, 1};
+  avatar.golden.png = golden_png;
+  budget = {.peak_memory_bytes = 1 << 20, .macs_per_frame = count_macs(avatar.network, shapes), .gaussians = 5};
+}
+
+MotionSample::MotionSample() {
+  root_translation = patterned(3 * 3);
+  for (uint32_t frame = 0; frame < 3; ++frame) {
+    const float poses[8] = {1, 0, 0, 0, 0.5f, frame == 1 ? -0.5f : 0.5f, 0.5f, 0.5f};
+    rotations.insert(rotations.end(), poses, poses + 8);
+  }
+  motion = {.name = "sample motion",
+            .frames_per_second = 30,
+            .joint_names = {"pelvis", "spine1"},
+            .frame_count = 3,
+            .root_translation_m = root_translation,
+            .rotations = rotations};
+}
+
+}  // namespace figurine::samples
