@@ -1,0 +1,70 @@
+// figurine_model_bench: milliseconds of every part of a training iteration at the `edge` setting (medians of interleaved rounds). Not a test.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "tests/toolchain/model/synthetic_body.h"
+#include "toolchain/model/head.h"
+#include "toolchain/model/splatter.h"
+
+namespace {
+
+using namespace figurine;
+using namespace figurine::model;
+
+double now_ms() { return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+struct Row {
+  std::string name;
+  std::function<void()> run;
+  std::vector<double> ms;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const uint32_t threads = argc > 1 ? static_cast<uint32_t>(std::atoi(argv[1])) : 2;
+  const int rounds = argc > 2 ? std::atoi(argv[2]) : 30;
+  const testing::SyntheticBody capsule(128, 77);
+  const std::vector<Affine> transforms = capsule.bent();
+  Camera camera = *make_orbit_camera({.azimuth_deg = 20, .elevation_deg = 5, .distance_m = 3, .vertical_fov_deg = 34, .target_m = {0, 0.87f, 0}}, 512, 512);
+  const HeadFrame frame{.body = &capsule.body, .texel_position_m = capsule.position, .world_from_rest = transforms, .decoding = {}};
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal;
+  std::vector<float> head(128 * 128 * 14), head_gradient(head.size());
+  for (float& value : head) value = 0.3f * normal(random);
+  const PixelRect crop{0, 0, 512, 512};
+  std::vector<float> image(4 * 512 * 512), image_gradient(image.size());
+  for (float& value : image_gradient) value = normal(random);
+  GaussianBuffer<float> gaussians, gradients;
+  gradients.resize(capsule.body.texel_count(), 0);
+  Splatter<float> splatter({.threads = threads});
+  std::vector<Row> rows{
+      {"decode", [&] { decode_head(frame, head.data(), threads, gaussians); }, {}},
+      {"splat forward", [&] { splatter.forward(gaussians.view(), camera, crop, image.data()); }, {}},
+      {"splat backward", [&] { splatter.backward(image.data(), image_gradient.data(), gradients.gradients()); }, {}},
+      {"decode backward", [&] { decode_head_backward(frame, head.data(), gradients, threads, head_gradient.data()); }, {}},
+  };
+  for (int round = 0; round < rounds; ++round) {
+    for (Row& row : rows) {
+      const double start = now_ms();
+      row.run();
+      row.ms.push_back(now_ms() - start);
+    }
+  }
+  const SplatterStatistics& statistics = splatter.statistics();
+  std::printf("%u threads, %u Gaussians, %llu visible, %llu pairs, %llu blocks\n", threads, gaussians.count,
+              static_cast<unsigned long long>(statistics.visible), static_cast<unsigned long long>(statistics.pairs),
+              static_cast<unsigned long long>(statistics.blocks));
+  for (Row& row : rows) {
+    std::sort(row.ms.begin(), row.ms.end());
+    std::printf("%-18s %8.3f ms (best %.3f)\n", row.name.c_str(), row.ms[row.ms.size() / 2], row.ms.front());
+  }
+  return 0;
+}
