@@ -1,0 +1,32 @@
+#include "toolchain/train/interrupt.h"
+
+#include <csignal>
+
+namespace figurine::train {
+
+namespace {
+
+volatile std::sig_atomic_t interrupt_requested = 0;
+struct sigaction previous_int, previous_term;
+
+void handle(int) { interrupt_requested = 1; }
+
+}  // namespace
+
+InterruptGuard::InterruptGuard() {
+  interrupt_requested = 0;
+  struct sigaction action{};
+  action.sa_handler = handle;
+  action.sa_flags = SA_RESETHAND;  // the second signal finds the default handler
+  sigaction(SIGINT, &action, &previous_int);
+  sigaction(SIGTERM, &action, &previous_term);
+}
+
+InterruptGuard::~InterruptGuard() {
+  sigaction(SIGINT, &previous_int, nullptr);
+  sigaction(SIGTERM, &previous_term, nullptr);
+}
+
+bool InterruptGuard::requested() const { return interrupt_requested != 0; }
+
+}  // namespace figurine::train

@@ -1,0 +1,24 @@
+// Ctrl-C as a flag: long work looks at it between steps, saves its state and throws Interrupted. A second Ctrl-C ends the process at once.
+#pragma once
+
+#include <stdexcept>
+
+namespace figurine::train {
+
+// Stopped by the user; what was done is saved. toolchain/cli turns it into exit code 130 (128 + SIGINT, as shells expect).
+class Interrupted : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// Takes SIGINT and SIGTERM while it lives; the old handlers come back afterwards. One at a time.
+class InterruptGuard {
+ public:
+  InterruptGuard();
+  ~InterruptGuard();
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+  bool requested() const;
+};
+
+}  // namespace figurine::train

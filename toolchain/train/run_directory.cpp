@@ -1,0 +1,232 @@
+#include "toolchain/train/run_directory.h"
+
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "ports/linux/files.h"
+#include "toolchain/error.h"
+
+namespace figurine::train {
+
+namespace {
+
+constexpr char kLogHeader[] = "iteration,seconds,learning_rate,loss,psnr_db\n";
+
+std::span<const std::byte> bytes_of(const std::string& text) { return {reinterpret_cast<const std::byte*>(text.data()), text.size()}; }
+
+void write_text(const std::string& path, const std::string& text) {
+  throw_if_error(ports::write_file_atomically(path, bytes_of(text)), "cannot save");
+}
+
+// Doubles as text that reads back to the same bits.
+std::string exact(double value) {
+  char text[40];
+  const auto end = std::to_chars(text, text + sizeof(text), value);
+  return {text, end.ptr};
+}
+
+double parse_double(const std::string& path, const std::map<std::string, std::string>& metadata, const std::string& key) {
+  const auto found = metadata.find(key);
+  double value = 0;
+  if (found == metadata.end()) throw InputError(path + ": " + key + ": missing");
+  const std::string& text = found->second;
+  const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (end.ec != std::errc{} || end.ptr != text.data() + text.size() || !(value >= 0) || value > 1e15) {
+    throw InputError(path + ": " + key + ": \"" + text + "\" is no sound number");
+  }
+  return value;
+}
+
+void add_weights(const model::PoseUNet& unet, TensorFile& file) {
+  std::vector<float> storage;
+  const Network network = unet.export_network(storage);
+  for (size_t i = 0, conv = 0; i < network.layers.size(); ++i) {
+    const Layer& layer = network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    const std::string name = "layer." + std::to_string(conv++);
+    const int64_t out = layer.out_channels, kernel = layer.kernel;
+    const int64_t in = static_cast<int64_t>(layer.weights.size()) / (out * kernel * kernel);
+    file.tensors[name + ".weight"] = {{out, kernel, kernel, in}, {layer.weights.begin(), layer.weights.end()}};
+    file.tensors[name + ".bias"] = {{out}, {layer.bias.begin(), layer.bias.end()}};
+  }
+}
+
+void take_weights(const std::string& path, const TensorFile& file, model::PoseUNet& unet) {
+  std::vector<float> storage;
+  Network network = unet.export_network(storage);
+  size_t conv = 0;
+  for (Layer& layer : network.layers) {
+    if (layer.op != LayerOp::kConv2d) continue;
+    const std::string name = "layer." + std::to_string(conv++);
+    for (const bool is_bias : {false, true}) {
+      const std::string field = name + (is_bias ? ".bias" : ".weight");
+      const auto found = file.tensors.find(field);
+      if (found == file.tensors.end()) throw InputError(path + ": " + field + ": missing");
+      std::span<const float>& values = is_bias ? layer.bias : layer.weights;
+      const int64_t out = layer.out_channels, kernel = layer.kernel;
+      const std::vector<int64_t> shape =
+          is_bias ? std::vector<int64_t>{out} : std::vector<int64_t>{out, kernel, kernel, int64_t(values.size()) / (out * kernel * kernel)};
+      if (found->second.shape != shape) throw InputError(path + ": " + field + ": is of another shape than this run's network");
+      values = found->second.values;
+    }
+  }
+  unet.import_network(network);
+}
+
+NamedTensor named(const torch::Tensor& tensor) {
+  const float* data = tensor.data_ptr<float>();
+  return {{tensor.numel()}, {data, data + tensor.numel()}};
+}
+
+void take_moment(const std::string& path, const TensorFile& file, const std::string& name, torch::Tensor& moment) {
+  const auto found = file.tensors.find(name);
+  if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
+  if (found->second.values.size() != static_cast<size_t>(moment.numel())) throw InputError(path + ": " + name + ": is of another size");
+  std::memcpy(moment.data_ptr<float>(), found->second.values.data(), found->second.values.size() * sizeof(float));
+}
+
+struct StageField {
+  const char* name;
+  double StageSeconds::* member;
+};
+constexpr StageField kStageFields[] = {{"seconds_data", &StageSeconds::data},
+                                       {"seconds_unet_forward", &StageSeconds::unet_forward},
+                                       {"seconds_splat_forward", &StageSeconds::splat_forward},
+                                       {"seconds_loss", &StageSeconds::loss},
+                                       {"seconds_splat_backward", &StageSeconds::splat_backward},
+                                       {"seconds_unet_backward", &StageSeconds::unet_backward},
+                                       {"seconds_optimiser", &StageSeconds::optimiser}};
+
+}  // namespace
+
+void save_weights(const RunDirectory& run, const model::PoseUNet& unet) {
+  TensorFile file;
+  add_weights(unet, file);
+  write_tensor_file(run.weights(), file);
+}
+
+void load_weights(const std::string& path, model::PoseUNet& unet) {
+  const std::string file = std::filesystem::is_directory(path) ? RunDirectory{path}.weights() : path;
+  take_weights(file, read_tensor_file(file), unet);
+}
+
+void save_checkpoint(const RunDirectory& run, const TrainingState& state, const model::PoseUNet& unet, const model::AdamW& optimiser) {
+  TensorFile file;
+  add_weights(unet, file);
+  file.tensors["adamw.first_moment"] = named(optimiser.first_moment);
+  file.tensors["adamw.second_moment"] = named(optimiser.second_moment);
+  file.metadata["iteration"] = exact(static_cast<double>(state.iteration));
+  file.metadata["seconds"] = exact(state.seconds);
+  file.metadata["adamw_steps"] = exact(static_cast<double>(optimiser.steps));
+  for (const StageField& field : kStageFields) file.metadata[field.name] = exact(state.stages.*field.member);
+  write_tensor_file(run.checkpoint(), file);
+}
+
+TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, model::AdamW& optimiser) {
+  const std::string path = run.checkpoint();
+  const TensorFile file = read_tensor_file(path);
+  TrainingState state;
+  state.iteration = static_cast<uint64_t>(parse_double(path, file.metadata, "iteration"));
+  state.seconds = parse_double(path, file.metadata, "seconds");
+  for (const StageField& field : kStageFields) state.stages.*field.member = parse_double(path, file.metadata, field.name);
+  take_weights(path, file, unet);
+  take_moment(path, file, "adamw.first_moment", optimiser.first_moment);
+  take_moment(path, file, "adamw.second_moment", optimiser.second_moment);
+  optimiser.steps = static_cast<int64_t>(parse_double(path, file.metadata, "adamw_steps"));
+  return state;
+}
+
+void save_log(const RunDirectory& run, const std::vector<LogRow>& rows) {
+  std::string text = kLogHeader;
+  for (const LogRow& row : rows) {
+    char line[160];
+    std::snprintf(line, sizeof(line), "%llu,%.3f,%.6g,%.6f,%.3f\n", static_cast<unsigned long long>(row.iteration), row.seconds,
+                  row.learning_rate, row.loss, row.psnr_db);
+    text += line;
+  }
+  write_text(run.log(), text);
+}
+
+std::vector<LogRow> load_log(const RunDirectory& run, uint64_t iteration) {
+  std::vector<LogRow> rows;
+  std::ifstream file(run.log());
+  std::string line;
+  std::getline(file, line);
+  while (std::getline(file, line)) {
+    LogRow row;
+    unsigned long long at = 0;
+    if (std::sscanf(line.c_str(), "%llu,%lf,%lf,%lf,%lf", &at, &row.seconds, &row.learning_rate, &row.loss, &row.psnr_db) != 5) {
+      throw InputError(run.log() + ": row " + std::to_string(rows.size() + 1) + ": not five numbers");
+    }
+    row.iteration = at;
+    if (row.iteration <= iteration) rows.push_back(row);
+  }
+  return rows;
+}
+
+nlohmann::json read_json(const std::string& path) {
+  const ports::MappedFile file = [&] {
+    Result<ports::MappedFile> opened = ports::MappedFile::open(path);
+    if (!opened.ok()) throw InputError(opened.status().message());
+    return std::move(opened).value();
+  }();
+  const char* text = reinterpret_cast<const char*>(file.bytes().data());
+  try {
+    return nlohmann::json::parse(text, text + file.bytes().size());
+  } catch (const nlohmann::json::exception&) {
+    throw InputError(path + ": is not JSON");
+  }
+}
+
+void write_json(const std::string& path, const nlohmann::json& json) { write_text(path, json.dump(2) + "\n"); }
+
+nlohmann::json describe_machine() {
+  std::string cpu = "unknown", line;
+  std::ifstream info("/proc/cpuinfo");
+  while (std::getline(info, line)) {
+    if (line.rfind("model name", 0) != 0) continue;
+    if (const size_t colon = line.find(": "); colon != std::string::npos) cpu = line.substr(colon + 2);
+    break;
+  }
+  utsname name{};
+  uname(&name);
+  return {{"cpu", cpu}, {"cores", std::thread::hardware_concurrency()}, {"architecture", name.machine}, {"system", name.sysname}};
+}
+
+std::string utc_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+std::string current_commit() {
+  if (const char* given = std::getenv("FIGURINE_COMMIT"); given != nullptr && *given != 0) return given;
+  std::error_code error;
+  for (std::filesystem::path folder = std::filesystem::current_path(error); !error; folder = folder.parent_path()) {
+    std::string head;
+    std::ifstream file(folder / ".git" / "HEAD");
+    if (std::getline(file, head)) {
+      if (head.rfind("ref: ", 0) != 0) return head;
+      std::string commit;
+      std::ifstream reference(folder / ".git" / head.substr(5));
+      if (std::getline(reference, commit)) return commit;
+      break;
+    }
+    if (folder == folder.root_path()) break;
+  }
+  return "unknown";
+}
+
+}  // namespace figurine::train

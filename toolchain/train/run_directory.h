@@ -1,0 +1,75 @@
+// The folder that one training leaves behind (docs/training.md):
+//
+//   run.json                 command, settings, data set, body, machine; when done also iterations, seconds and where they went
+//   log.csv                  iteration, seconds, learning rate, loss, PSNR: means of the iterations since the row before
+//   weights.safetensors      the UNet: layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out]
+//   checkpoint.safetensors   the same and what --resume needs: AdamW's moments, iteration, seconds
+//   evaluation.json          by figurine-train evaluate reconstruction
+//
+// Every file appears whole or not at all.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "toolchain/model/unet.h"
+#include "toolchain/train/settings.h"
+#include "toolchain/train/tensor_file.h"
+
+namespace figurine::train {
+
+struct RunDirectory {
+  std::string path;
+  std::string run_json() const { return path + "/run.json"; }
+  std::string log() const { return path + "/log.csv"; }
+  std::string weights() const { return path + "/weights.safetensors"; }
+  std::string checkpoint() const { return path + "/checkpoint.safetensors"; }
+  std::string evaluation() const { return path + "/evaluation.json"; }
+};
+
+// Where the seconds of training went.
+struct StageSeconds {
+  double data = 0;  // waiting for the feed
+  double unet_forward = 0;
+  double splat_forward = 0;
+  double loss = 0;  // forward and backward: they are fused
+  double splat_backward = 0;
+  double unet_backward = 0;
+  double optimiser = 0;
+  double total() const { return data + unet_forward + splat_forward + loss + splat_backward + unet_backward + optimiser; }
+};
+
+// What changes while training; with the settings it determines everything that follows.
+struct TrainingState {
+  uint64_t iteration = 0;  // done so far
+  double seconds = 0;      // spent in the loop, all attempts together
+  StageSeconds stages;
+};
+
+struct LogRow {
+  uint64_t iteration = 0;
+  double seconds = 0, learning_rate = 0, loss = 0, psnr_db = 0;
+};
+
+void save_weights(const RunDirectory& run, const model::PoseUNet& unet);
+// A weights or checkpoint file, or a run folder. Throws InputError naming file and layer if a shape differs.
+void load_weights(const std::string& path, model::PoseUNet& unet);
+
+void save_checkpoint(const RunDirectory& run, const TrainingState& state, const model::PoseUNet& unet, const model::AdamW& optimiser);
+TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, model::AdamW& optimiser);
+
+void save_log(const RunDirectory& run, const std::vector<LogRow>& rows);
+// Rows up to and with `iteration`.
+std::vector<LogRow> load_log(const RunDirectory& run, uint64_t iteration);
+
+// Throw InputError naming the file.
+nlohmann::json read_json(const std::string& path);
+void write_json(const std::string& path, const nlohmann::json& json);
+
+// CPU model, cores, operating system: beside every figure.
+nlohmann::json describe_machine();
+std::string utc_now();         // 2026-01-31T12:00:00Z
+std::string current_commit();  // $FIGURINE_COMMIT, or .git's of the working directory; "unknown" otherwise
+
+}  // namespace figurine::train

@@ -1,0 +1,80 @@
+// What the training loop eats: for every iteration one image of one training pose, cropped, with its UNet input; prepared on a thread of
+// its own, a few iterations ahead.
+//
+// Which image an iteration gets depends on (seed, iteration) alone. Images are decoded at their first use and kept as 8-bit crops around
+// the mask (about 0.3 MB at 512x512), up to a limit; past it they are decoded again.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "toolchain/dataset/dataset.h"
+#include "toolchain/model/render.h"
+#include "toolchain/train/avatar_model.h"
+#include "toolchain/train/random.h"
+
+namespace figurine::train {
+
+struct Sample {
+  uint64_t iteration = 0;
+  size_t frame = 0, camera = 0;  // of the data set's lists
+  PosedBody posed;
+  model::RenderView view;
+  torch::Tensor target;  // [4,h,w] premultiplied RGB and mask of view.crop
+  std::array<float, 3> background{0, 0, 0};
+  float loss_scale = 1;  // crop area over mask box area: keeps a pixel's weight when the whole image is looked at
+};
+
+struct CroppedImage {
+  model::PixelRect rect;      // inside the full image
+  std::vector<uint8_t> rgba;  // [rect.height, rect.width, 4] premultiplied
+};
+
+// The part of an image within margin_px of the pixels with alpha > 0; the whole image if there are none.
+CroppedImage crop_to_mask(const dataset::CaptureImage& image, uint32_t margin_px);
+
+// [4,h,w] float of `rect`, zero where the crop has nothing.
+torch::Tensor target_of(const CroppedImage& image, const model::PixelRect& rect);
+
+class SampleFeed {
+ public:
+  // data and model are borrowed. Throws InputError if there is no training image.
+  SampleFeed(const dataset::Dataset& data, const AvatarModel& model, uint64_t first_iteration);
+  ~SampleFeed();
+  SampleFeed(const SampleFeed&) = delete;
+  SampleFeed& operator=(const SampleFeed&) = delete;
+
+  // Samples of first_iteration, first_iteration + 1, ... Rethrows what went wrong while preparing (InputError on a damaged image).
+  Sample next();
+
+  size_t image_count() const { return pairs_.size(); }
+
+ private:
+  Sample prepare(uint64_t iteration);
+  std::shared_ptr<const CroppedImage> image(size_t pair);
+  void work();
+
+  const dataset::Dataset& data_;
+  const AvatarModel& model_;
+  std::vector<std::pair<size_t, size_t>> pairs_;  // (frame, camera) of all training images
+  ShuffledOrder order_;
+  std::unordered_map<size_t, std::shared_ptr<const CroppedImage>> images_;
+  size_t image_bytes_ = 0;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Sample> ready_;
+  std::exception_ptr error_;
+  bool stop_ = false;
+  uint64_t next_iteration_;
+  std::thread worker_;  // last: everything above exists before it starts
+};
+
+}  // namespace figurine::train

@@ -1,0 +1,157 @@
+#include "toolchain/train/settings.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "figurine/body.h"
+#include "figurine/gaussian.h"
+#include "toolchain/error.h"
+
+namespace figurine::train {
+
+namespace {
+
+template <class Enum, size_t N>
+Enum parse(const std::string& text, const std::array<Enum, N>& values, const std::string& where) {
+  for (Enum value : values) {
+    if (text == to_string(value)) return value;
+  }
+  throw InputError(where + ": unknown value \"" + text + "\"");
+}
+
+constexpr std::array kPrecisions{model::Precision::kFloat32, model::Precision::kBfloat16};
+constexpr std::array kBackgrounds{TrainingBackground::kBlack, TrainingBackground::kGrey, TrainingBackground::kRandom};
+constexpr std::array kTemplateModes{TemplateMode::kMean, TemplateMode::kShaped};
+
+void require(bool condition, const std::string& where, const char* what) {
+  if (!condition) throw InputError(where + ": " + what);
+}
+
+}  // namespace
+
+const Preset& find_preset(const std::string& name) {
+  std::string known;
+  for (const Preset& preset : kPresets) {
+    if (name == preset.name) return preset;
+    known += (known.empty() ? "" : ", ") + std::string(preset.name);
+  }
+  throw InputError("preset: \"" + name + "\" is none of " + known);
+}
+
+TrainSettings preset_settings(const std::string& name) {
+  const Preset& preset = find_preset(name);
+  TrainSettings settings;
+  settings.preset = name;
+  settings.fourier_octaves = preset.fourier_octaves;
+  settings.decoding.sh_degree = preset.sh_degree;
+  return settings;
+}
+
+uint32_t input_channels(const TrainSettings& settings) { return kMapChannels + 4 * settings.fourier_octaves; }
+
+Network make_network(const TrainSettings& settings) {
+  const Preset& preset = find_preset(settings.preset);
+  return make_pose_unet(preset.uv_size, input_channels(settings), preset.channels, head_channels(settings.decoding.sh_degree));
+}
+
+model::Precision best_precision() {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512bf16")) return model::Precision::kBfloat16;
+#endif
+  return model::Precision::kFloat32;
+}
+
+const char* to_string(model::Precision precision) { return precision == model::Precision::kBfloat16 ? "bf16" : "f32"; }
+
+const char* to_string(TrainingBackground background) {
+  switch (background) {
+    case TrainingBackground::kBlack:
+      return "black";
+    case TrainingBackground::kGrey:
+      return "grey";
+    case TrainingBackground::kRandom:
+      return "random";
+  }
+  return "?";
+}
+
+const char* to_string(TemplateMode mode) { return mode == TemplateMode::kMean ? "mean" : "shaped"; }
+
+nlohmann::json to_json(const TrainSettings& s) {
+  return {
+      {"preset", s.preset},
+      {"template", to_string(s.template_mode)},
+      {"freeze_pose", s.freeze_pose},
+      {"fourier_octaves", s.fourier_octaves},
+      {"decoding",
+       {{"offset_scale_m", s.decoding.offset_scale_m},
+        {"spacing_scale", s.decoding.spacing_scale},
+        {"max_log_scale", s.decoding.max_log_scale},
+        {"opacity_bias", s.decoding.opacity_bias},
+        {"sh_degree", s.decoding.sh_degree}}},
+      {"seed", s.seed},
+      {"init", s.init},
+      {"learning_rate", s.schedule.peak},
+      {"ramp_iterations", s.schedule.ramp_iterations},
+      {"learning_rate_floor", s.schedule.floor_fraction},
+      {"budget", {{"iterations", s.schedule.budget.iterations}, {"seconds", s.schedule.budget.seconds}}},
+      {"adamw", {{"beta1", s.adamw.beta1}, {"beta2", s.adamw.beta2}, {"epsilon", s.adamw.epsilon}, {"weight_decay", s.adamw.weight_decay}}},
+      {"precision", to_string(s.precision)},
+      {"threads", s.threads},
+      {"loss", {{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}, {"lpips", 0.0}}},
+      {"background", to_string(s.background)},
+      {"warmup_iterations", s.warmup_iterations},
+      {"crop_margin_px", s.crop_margin_px},
+      {"whole_image_period", s.whole_image_period}};
+}
+
+TrainSettings settings_from_json(const nlohmann::json& json, const std::string& where) {
+  TrainSettings s;
+  try {
+    s.preset = json.at("preset").get<std::string>();
+    s.template_mode = parse(json.at("template").get<std::string>(), kTemplateModes, where + ": template");
+    s.freeze_pose = json.at("freeze_pose").get<bool>();
+    s.fourier_octaves = json.at("fourier_octaves").get<uint32_t>();
+    const nlohmann::json& decoding = json.at("decoding");
+    s.decoding = {.offset_scale_m = decoding.at("offset_scale_m").get<float>(),
+                  .spacing_scale = decoding.at("spacing_scale").get<float>(),
+                  .max_log_scale = decoding.at("max_log_scale").get<float>(),
+                  .opacity_bias = decoding.at("opacity_bias").get<float>(),
+                  .sh_degree = decoding.at("sh_degree").get<uint32_t>()};
+    s.seed = json.at("seed").get<uint64_t>();
+    s.init = json.at("init").get<std::string>();
+    s.schedule = {.peak = json.at("learning_rate").get<double>(),
+                  .ramp_iterations = json.at("ramp_iterations").get<uint64_t>(),
+                  .floor_fraction = json.at("learning_rate_floor").get<double>(),
+                  .budget = {.iterations = json.at("budget").at("iterations").get<uint64_t>(),
+                             .seconds = json.at("budget").at("seconds").get<double>()}};
+    const nlohmann::json& adamw = json.at("adamw");
+    s.adamw = {.beta1 = adamw.at("beta1").get<double>(),
+               .beta2 = adamw.at("beta2").get<double>(),
+               .epsilon = adamw.at("epsilon").get<double>(),
+               .weight_decay = adamw.at("weight_decay").get<double>()};
+    s.precision = parse(json.at("precision").get<std::string>(), kPrecisions, where + ": precision");
+    s.threads = json.at("threads").get<uint32_t>();
+    s.ssim_weight = json.at("loss").at("ssim").get<float>();
+    s.mask_weight = json.at("loss").at("mask").get<float>();
+    s.background = parse(json.at("background").get<std::string>(), kBackgrounds, where + ": background");
+    s.warmup_iterations = json.at("warmup_iterations").get<uint32_t>();
+    s.crop_margin_px = json.at("crop_margin_px").get<uint32_t>();
+    s.whole_image_period = json.at("whole_image_period").get<uint32_t>();
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(where + ": settings: " + error.what());
+  }
+  find_preset(s.preset);
+  require(s.fourier_octaves <= 10, where, "fourier_octaves: more than 10");
+  require(s.decoding.sh_degree <= kMaxShDegree, where, "decoding.sh_degree: more than 3");
+  for (float value : {s.decoding.offset_scale_m, s.decoding.spacing_scale, s.decoding.max_log_scale}) {
+    require(std::isfinite(value) && value > 0, where, "decoding: scales must be positive and finite");
+  }
+  require(s.schedule.peak > 0 && std::isfinite(s.schedule.peak), where, "learning_rate: must be positive and finite");
+  require((s.schedule.budget.iterations > 0) != (s.schedule.budget.seconds > 0), where, "budget: iterations or seconds, one of both");
+  require(s.threads >= 1 && s.threads <= 256, where, "threads: must be 1 to 256");
+  return s;
+}
+
+}  // namespace figurine::train

@@ -1,0 +1,74 @@
+// What one avatar's training is told to do: everything that, with the data, decides the weights. Kept in RUN/run.json.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "figurine/avatar.h"
+#include "toolchain/model/unet.h"
+#include "toolchain/train/schedule.h"
+
+namespace figurine::train {
+
+struct Preset {
+  const char* name;
+  uint32_t uv_size;          // T
+  uint32_t channels;         // C
+  uint32_t sh_degree;        // d
+  uint32_t fourier_octaves;  // constant input channels: 4 per octave; 0: as in the paper
+};
+
+inline constexpr std::array<Preset, 3> kPresets{{{"nano", 32, 8, 0, 5}, {"edge", 128, 32, 0, 5}, {"paper", 256, 64, 3, 0}}};
+
+// Throws InputError naming the known ones.
+const Preset& find_preset(const std::string& name);
+
+// What lies behind prediction and truth in the loss.
+enum class TrainingBackground : uint8_t { kBlack, kGrey, kRandom };
+
+struct TrainSettings {
+  std::string preset = "edge";
+  TemplateMode template_mode = TemplateMode::kShaped;
+  bool freeze_pose = false;  // the network sees the rest pose in the true root orientation; the Gaussians are skinned with the true pose
+  uint32_t fourier_octaves = 5;
+  HeadDecoding decoding;
+
+  uint64_t seed = 1;  // of the order of the images; initial weights are the same for all avatars (kInitialWeightsSeed, or --init)
+  std::string init;   // weights or run to start from; empty: the common initial weights
+  Schedule schedule{.peak = 2e-3, .ramp_iterations = 50, .floor_fraction = 0.02, .budget = {.iterations = 0, .seconds = 600}};
+  model::AdamWOptions adamw{.beta1 = 0.9, .beta2 = 0.999, .epsilon = 1e-10, .weight_decay = 0.0};
+  model::Precision precision = model::Precision::kFloat32;
+  uint32_t threads = 1;
+  float ssim_weight = 0.1f;
+  float mask_weight = 0.1f;
+  TrainingBackground background = TrainingBackground::kBlack;
+  uint32_t warmup_iterations = 0;    // of fitting reference Gaussians before the first image
+  uint32_t crop_margin_px = 16;      // around the box of the true mask
+  uint32_t whole_image_period = 16;  // every so many iterations the loss sees the whole image; 0: never
+};
+
+// All avatars of a population start from the same weights (paper, section 4.1).
+inline constexpr uint64_t kInitialWeightsSeed = 0;
+
+uint32_t input_channels(const TrainSettings& settings);
+// Shapes only.
+Network make_network(const TrainSettings& settings);
+
+// Settings of a preset with its own Fourier channels and SH degree, all else as above.
+TrainSettings preset_settings(const std::string& name);
+
+// bf16 where the CPU multiplies it in hardware, float elsewhere.
+model::Precision best_precision();
+
+const char* to_string(model::Precision precision);
+const char* to_string(TrainingBackground background);
+const char* to_string(TemplateMode mode);
+
+nlohmann::json to_json(const TrainSettings& settings);
+// Throws InputError "where: FIELD: reason".
+TrainSettings settings_from_json(const nlohmann::json& json, const std::string& where);
+
+}  // namespace figurine::train

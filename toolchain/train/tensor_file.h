@@ -1,0 +1,31 @@
+// Named float arrays and string metadata in one file, in the safetensors layout: readable by its own library in any language, and by forty
+// lines here.
+//
+//   8 bytes little-endian: length of the header;   header: JSON {"__metadata__": {key: string}, name: {"dtype": "F32", "shape": [...],
+//   "data_offsets": [begin, end]}};   data.   Only F32 is read and written. Files appear whole or not at all.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace figurine::train {
+
+struct NamedTensor {
+  std::vector<int64_t> shape;
+  std::vector<float> values;
+};
+
+struct TensorFile {
+  std::map<std::string, std::string> metadata;
+  std::map<std::string, NamedTensor> tensors;
+};
+
+// Throws InputError naming the path: missing, cut off, not this layout, sizes that contradict each other, values that are not finite.
+TensorFile read_tensor_file(const std::string& path);
+
+// Throws InputError if the disk refuses.
+void write_tensor_file(const std::string& path, const TensorFile& file);
+
+}  // namespace figurine::train

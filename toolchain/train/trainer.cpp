@@ -1,0 +1,309 @@
+#include "toolchain/train/trainer.h"
+
+#include <ATen/Parallel.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+#include "toolchain/dataset/dataset.h"
+#include "toolchain/error.h"
+#include "toolchain/model/loss.h"
+#include "toolchain/train/avatar_model.h"
+#include "toolchain/train/interrupt.h"
+#include "toolchain/train/package_file.h"
+#include "toolchain/train/progress.h"
+#include "toolchain/train/reference_gaussians.h"
+#include "toolchain/train/sample_feed.h"
+
+namespace figurine::train {
+
+namespace {
+
+constexpr int kRunFormat = 1;
+constexpr uint64_t kLogPeriod = 50;    // iterations per row
+constexpr double kRunningMean = 0.02;  // weight of the newest iteration in what the progress bar shows
+
+double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+// Adds the time since the last call to a stage.
+class StageClock {
+ public:
+  void add(double& stage) {
+    const double now = now_s();
+    stage += now - last_;
+    last_ = now;
+  }
+
+ private:
+  double last_ = now_s();
+};
+
+// Means over the iterations since the last log row.
+struct Means {
+  double loss = 0, squared_error = 0;
+  uint64_t foreground = 0, count = 0;
+  double psnr_db() const {
+    return foreground == 0 || squared_error <= 0 ? 0 : -10 * std::log10(squared_error / (3.0 * static_cast<double>(foreground)));
+  }
+};
+
+struct IterationResult {
+  double loss = 0, squared_error = 0;
+  uint64_t foreground = 0;
+};
+
+class Trainer {
+ public:
+  Trainer(const TrainRequest& request, const TrainSettings& settings, const PackageFile& body, const dataset::Dataset& data,
+          nlohmann::json description)
+      : request_(request),
+        settings_(settings),
+        run_{request.run},
+        data_(data),
+        description_(std::move(description)),
+        model_(body.package.body(), data.shape(), settings, settings.precision),
+        optimiser_(model_.unet().parameter_count(), settings.adamw) {}
+
+  TrainResult run() {
+    start();
+    SampleFeed feed(data_, model_, state_.iteration);
+    Progress progress(std::filesystem::path(request_.data).filename().string(), request_.quiet);
+    const InterruptGuard interrupt;
+    double last_checkpoint = now_s();
+    const double session_start = state_.seconds;
+    const uint64_t session_first = state_.iteration;
+    double done = train::progress(settings_.schedule.budget, state_.iteration, state_.seconds);
+    while (done < 1) {
+      if (interrupt.requested() || (request_.stop_after > 0 && state_.iteration >= request_.stop_after)) {
+        save("interrupted");
+        throw Interrupted(run_.path + ": stopped after " + std::to_string(state_.iteration) + " iterations; --resume goes on from here");
+      }
+      const double rate = learning_rate(settings_.schedule, state_.iteration, state_.seconds);
+      const double before = now_s();
+      const IterationResult result = iterate(feed, rate);
+      state_.seconds += now_s() - before;
+      ++state_.iteration;
+      record(result, rate);
+      done = train::progress(settings_.schedule.budget, state_.iteration, state_.seconds);
+      const double speed = static_cast<double>(state_.iteration - session_first) / std::max(1e-9, state_.seconds - session_start);
+      progress.show(
+          {.iteration = state_.iteration,
+           .fraction = done,
+           .loss = shown_loss_,
+           .psnr_db = shown_psnr(),
+           .iterations_per_second = speed,
+           .seconds_left = settings_.schedule.budget.iterations > 0
+                               ? static_cast<double>(settings_.schedule.budget.iterations - state_.iteration) / std::max(1e-9, speed)
+                               : settings_.schedule.budget.seconds - state_.seconds});
+      if (now_s() - last_checkpoint > request_.checkpoint_period_s && done < 1) {
+        save("running");
+        last_checkpoint = now_s();
+      }
+    }
+    save("finished");
+    return {.state = state_, .loss = shown_loss_, .psnr_db = shown_psnr()};
+  }
+
+ private:
+  void start() {
+    if (request_.resume && std::filesystem::exists(run_.checkpoint())) {
+      state_ = load_checkpoint(run_, model_.unet(), optimiser_);
+      rows_ = load_log(run_, state_.iteration);
+    } else {
+      if (!settings_.init.empty()) load_weights(settings_.init, model_.unet());
+      write_json(run_.run_json(), description_);
+    }
+    if (state_.iteration < settings_.warmup_iterations) reference_ = reference_head(data_, model_);
+  }
+
+  IterationResult iterate(SampleFeed& feed, double rate) {
+    StageClock clock;
+    const Sample sample = feed.next();
+    clock.add(state_.stages.data);
+    model_.unet().zero_gradients();
+    const torch::Tensor head = model_.unet().forward(sample.posed.input);
+    clock.add(state_.stages.unet_forward);
+    IterationResult result;
+    if (sample.iteration < settings_.warmup_iterations) {
+      const torch::Tensor loss = reference_loss(head, reference_, model_.body());
+      result.loss = loss.item<double>();
+      loss.backward();
+      clock.add(state_.stages.unet_backward);
+    } else {
+      result = image_iteration(sample, head, clock);
+    }
+    if (!std::isfinite(result.loss)) fail(sample, "the loss is not finite");
+    if (!optimiser_.step(model_.unet().weights(), model_.unet().gradients(), rate)) fail(sample, "a gradient is not finite");
+    clock.add(state_.stages.optimiser);
+    return result;
+  }
+
+  // The graph is cut at the head and at the picture, so that each part's backward pass can be timed. Gradients are the same.
+  IterationResult image_iteration(const Sample& sample, const torch::Tensor& head, StageClock& clock) {
+    const torch::Tensor head_leaf = head.detach().requires_grad_();
+    const torch::Tensor image = model_.renderer().render(head_leaf, model_.head_frame(sample.posed), sample.view);
+    clock.add(state_.stages.splat_forward);
+    const torch::Tensor image_leaf = image.detach().requires_grad_();
+    model::LossTerms terms;
+    const torch::Tensor loss = model::image_loss(
+        image_leaf, sample.target, sample.background,
+        {.ssim_weight = settings_.ssim_weight, .mask_weight = settings_.mask_weight, .threads = settings_.threads}, &terms);
+    (loss * sample.loss_scale).backward();
+    clock.add(state_.stages.loss);
+    image.backward(image_leaf.grad());
+    clock.add(state_.stages.splat_backward);
+    head.backward(head_leaf.grad());
+    clock.add(state_.stages.unet_backward);
+    return {terms.total * sample.loss_scale, terms.squared_error, terms.foreground};
+  }
+
+  [[noreturn]] void fail(const Sample& sample, const char* what) const {
+    throw InputError(run_.path + ": iteration " + std::to_string(sample.iteration) + " (" + data_.image_path(sample.frame, sample.camera) +
+                     "): " + what + "; the last checkpoint is kept");
+  }
+
+  void record(const IterationResult& result, double rate) {
+    means_.loss += result.loss;
+    means_.squared_error += result.squared_error;
+    means_.foreground += result.foreground;
+    ++means_.count;
+    const double weight = std::max(kRunningMean, 1.0 / static_cast<double>(++shown_count_));
+    shown_loss_ += weight * (result.loss - shown_loss_);
+    if (result.foreground > 0) {
+      const double mse = result.squared_error / (3.0 * static_cast<double>(result.foreground));
+      shown_mse_ = shown_mse_ < 0 ? mse : shown_mse_ + weight * (mse - shown_mse_);
+    }
+    if (state_.iteration % kLogPeriod == 0) {
+      rows_.push_back({state_.iteration, state_.seconds, rate, means_.loss / static_cast<double>(means_.count), means_.psnr_db()});
+      means_ = {};
+    }
+  }
+
+  double shown_psnr() const { return shown_mse_ > 0 ? -10 * std::log10(shown_mse_) : 0; }
+
+  void save(const char* status) {
+    save_checkpoint(run_, state_, model_.unet(), optimiser_);
+    save_weights(run_, model_.unet());
+    save_log(run_, rows_);
+    const double iterations = static_cast<double>(std::max<uint64_t>(1, state_.iteration));
+    const StageSeconds& s = state_.stages;
+    description_["status"] = status;
+    description_["iterations"] = state_.iteration;
+    description_["train_seconds"] = state_.seconds;
+    description_["iterations_per_second"] = state_.seconds > 0 ? static_cast<double>(state_.iteration) / state_.seconds : 0.0;
+    description_["breakdown_ms"] = {{"data", 1e3 * s.data / iterations},
+                                    {"unet_forward", 1e3 * s.unet_forward / iterations},
+                                    {"splat_forward", 1e3 * s.splat_forward / iterations},
+                                    {"loss", 1e3 * s.loss / iterations},
+                                    {"splat_backward", 1e3 * s.splat_backward / iterations},
+                                    {"unet_backward", 1e3 * s.unet_backward / iterations},
+                                    {"optimiser", 1e3 * s.optimiser / iterations}};
+    description_["running"] = {{"loss", shown_loss_}, {"psnr_db", shown_psnr()}};
+    description_["updated"] = utc_now();
+    write_json(run_.run_json(), description_);
+  }
+
+  const TrainRequest& request_;
+  TrainSettings settings_;
+  RunDirectory run_;
+  const dataset::Dataset& data_;
+  nlohmann::json description_;
+  AvatarModel model_;
+  model::AdamW optimiser_;
+  torch::Tensor reference_;
+  TrainingState state_;
+  std::vector<LogRow> rows_;
+  Means means_;
+  double shown_loss_ = 0, shown_mse_ = -1;
+  uint64_t shown_count_ = 0;
+};
+
+nlohmann::json describe(const TrainRequest& request, const TrainSettings& settings, const PackageFile& body, const dataset::Dataset& data) {
+  uint32_t held_out_cameras = 0;
+  for (const dataset::CaptureCamera& camera : data.cameras()) held_out_cameras += camera.held_out;
+  uint32_t frames[3] = {0, 0, 0};
+  for (const dataset::CaptureFrame& frame : data.frames()) ++frames[static_cast<int>(frame.split)];
+  Network network = make_network(settings);
+  const std::vector<ValueShape> shapes = value_or_throw(infer_shapes(network, false), settings.preset);
+  return {{"format", kRunFormat},
+          {"status", "running"},
+          {"tool", "figurine-train " FIGURINE_VERSION},
+          {"command", request.command},
+          {"created", utc_now()},
+          {"commit", current_commit()},
+          {"machine", describe_machine()},
+          {"settings", to_json(settings)},
+          {"macs_per_frame", count_macs(network, shapes)},
+          {"body", {{"path", request.body}, {"name", body.package.body().name}, {"hash", format_hash(body.package.content_hash())}}},
+          {"shape", data.shape()},
+          {"data",
+           {{"path", request.data},
+            {"seed", data.seed()},
+            {"sources", data.sources()},
+            {"cameras", data.cameras().size() - held_out_cameras},
+            {"held_out_cameras", held_out_cameras},
+            {"training_frames", frames[0]},
+            {"held_out_frames_interleaved", frames[1]},
+            {"held_out_frames_block", frames[2]}}}};
+}
+
+}  // namespace
+
+RunDescription read_run(const RunDirectory& run) {
+  const std::string path = run.run_json();
+  if (!std::filesystem::exists(path)) throw InputError(run.path + ": no run.json; is this a folder of figurine-train avatar?");
+  RunDescription description;
+  description.json = read_json(path);
+  try {
+    const nlohmann::json& json = description.json;
+    if (const int format = json.at("format").get<int>(); format != kRunFormat) {
+      throw InputError(path + ": format: is " + std::to_string(format) + ", this build reads " + std::to_string(kRunFormat));
+    }
+    description.data = json.at("data").at("path").get<std::string>();
+    description.body = json.at("body").at("path").get<std::string>();
+    description.body_hash = json.at("body").at("hash").get<std::string>();
+    description.shape = json.at("shape").get<std::vector<float>>();
+    description.settings = settings_from_json(json.at("settings"), path);
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(path + ": " + error.what());
+  }
+  return description;
+}
+
+TrainResult train_avatar(const TrainRequest& request) {
+  const RunDirectory run{request.run};
+  TrainSettings settings = request.settings;
+  nlohmann::json description;
+  const bool exists = std::filesystem::exists(run.run_json());
+  if (exists && !request.resume) throw InputError(request.run + ": holds a run already; --resume goes on with it");
+  if (!exists && request.resume) throw InputError(request.run + ": no run to resume (run.json is missing)");
+  const PackageFile body = open_package(request.body, PackageKind::kBody);
+  const std::string body_hash = format_hash(body.package.content_hash());
+  if (exists) {
+    RunDescription old = read_run(run);
+    if (old.body_hash != body_hash) {
+      throw InputError(request.run + ": was trained on body " + old.body_hash + ", " + request.body + " is " + body_hash);
+    }
+    settings = old.settings;
+    settings.threads = request.settings.threads;
+    description = std::move(old.json);
+    if (description.value("status", "") == "finished") {
+      return {.state = {.iteration = description.value("iterations", uint64_t{0}),
+                        .seconds = description.value("train_seconds", 0.0),
+                        .stages = {}},
+              .was_finished = true};
+    }
+  }
+  const dataset::Dataset data = dataset::Dataset::open(request.data, {.body = &body.package.body(), .body_hash = body_hash});
+  if (!exists) {
+    description = describe(request, settings, body, data);
+    std::error_code error;
+    std::filesystem::create_directories(request.run, error);
+    if (error) throw InputError(request.run + ": cannot be created: " + error.message());
+  }
+  at::set_num_threads(static_cast<int>(settings.threads));
+  return Trainer(request, settings, body, data, std::move(description)).run();
+}
+
+}  // namespace figurine::train
