@@ -5,8 +5,8 @@
 //   FrameAvatar seen[] = {{.avatar = *walker, .pose = motion.pose(12)}};
 //   (*renderer)->render({.camera = camera, .avatars = seen}, {.pixels = rgba, .stride_bytes = 4 * width, .format = PixelFormat::kRgba8});
 //
-// A frame takes any number of avatars and static Gaussians, sorted together by view depth. Packages are borrowed: their bytes must outlive the renderer.
-// A Renderer is used by one thread at a time; it spreads its own work over its pool.
+// A frame takes any number of avatars and static Gaussians, sorted together by view depth. Packages are borrowed: their bytes must outlive
+// the renderer. A Renderer is used by one thread at a time; it spreads its own work over its pool.
 #pragma once
 
 #include <array>
@@ -50,7 +50,7 @@ struct FrameAvatar {
 struct Frame {
   Camera camera;
   std::span<const FrameAvatar> avatars;
-  std::span<const GaussianView> gaussians;           // static, world space
+  std::span<const GaussianView> gaussians;         // static, world space
   std::optional<std::array<float, 3>> background;  // opaque colour behind; without it the image keeps its alpha
   SplatOptions splat;
 };
@@ -84,11 +84,12 @@ class Renderer {
   // Packs the network's weights and allocates what a frame of it needs. kMismatch if the avatar was made for another body.
   Result<AvatarId> add_avatar(const Package& avatar, const Package& body);
 
-  // Draws one frame. kInvalidArgument on an unsound camera, pose, target or Gaussian count; nothing was drawn then. Gaussians that are not finite are
-  // left out, one by one. The same input gives the same pixels for any number of threads.
+  // Draws one frame. kInvalidArgument on an unsound camera, pose, target or Gaussian count; nothing was drawn then. Gaussians that are not
+  // finite are left out, one by one. The same input gives the same pixels for any number of threads.
   Status render(const Frame& frame, const ImageTarget& target);
 
-  // The world-space Gaussians of one avatar in one pose, as render() would splat them; valid until the next call. For export and inspection.
+  // The world-space Gaussians of one avatar in one pose, as render() would splat them; valid until the next call. For export and
+  // inspection.
   Result<GaussianView> pose_avatar(AvatarId avatar, const PoseView& pose);
 
   const FrameStatistics& statistics() const;  // of the last frame

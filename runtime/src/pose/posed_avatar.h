@@ -1,0 +1,66 @@
+// One avatar, ready to be posed: its network, its person's canonical texels and joints, and the way from a pose to world-space Gaussians.
+//
+//   pose -> posed maps of the mean template -> network -> head decoding (canonical Gaussians) -> linear blend skinning -> Gaussians
+//
+// Based on: Loper et al., SMPL, 2015 (skinning); the head's parametrisation of figurine/avatar.h.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "figurine/avatar.h"
+#include "figurine/body.h"
+#include "figurine/gaussian.h"
+#include "runtime/src/memory.h"
+#include "runtime/src/nn/network_runner.h"
+#include "runtime/src/nn/thread_pool.h"
+#include "runtime/src/stage_clock.h"
+
+namespace figurine {
+
+// World-space Gaussians, shared by all avatars of a renderer: one is posed and projected before the next.
+struct GaussianArrays {
+  Buffer<float> position_m, covariance_factor, opacity, sh;
+
+  bool ensure(size_t count, uint32_t sh_degree);
+  GaussianView view(uint32_t count, uint32_t sh_degree) const;
+  uint64_t memory_bytes() const {
+    return position_m.memory_bytes() + covariance_factor.memory_bytes() + opacity.memory_bytes() + sh.memory_bytes();
+  }
+};
+
+class PosedAvatar {
+ public:
+  // The arrays behind avatar and body are borrowed and must outlive the object. Errors: kCorrupt if the network does not fit the maps or the decoding;
+  // kInvalidArgument; those of NetworkRunner::create; kOutOfMemory.
+  static Result<std::unique_ptr<PosedAvatar>> create(const Avatar& avatar, const Body& body, ThreadPool& pool);
+
+  const Body& body() const { return body_; }
+  uint32_t sh_degree() const { return decoding_.sh_degree; }
+  uint64_t macs() const { return network_->macs(); }
+
+  // Fills the arrays, which must have room, with one Gaussian per covered texel. The pose must be valid for the body.
+  Status pose(const PoseView& pose, GaussianArrays& gaussians, StageClock& clock);
+
+  uint64_t memory_bytes() const;
+
+ private:
+  PosedAvatar(const Avatar& avatar, const Body& body, ThreadPool& pool)
+      : body_(body), pool_(pool), statistics_(avatar.map_statistics), decoding_(avatar.decoding) {}
+
+  void decode(uint32_t begin, uint32_t end, GaussianArrays& gaussians) const;
+  void skin(uint32_t begin, uint32_t end, GaussianArrays& gaussians) const;
+
+  const Body body_;
+  ThreadPool& pool_;
+  const MapStatistics statistics_;
+  const HeadDecoding decoding_;
+  std::unique_ptr<NetworkRunner> network_;
+  uint32_t input_channels_ = 0;
+  Buffer<float> joint_position_m_;  // [J,3] of the template the Gaussians sit on
+  Buffer<float> texel_position_m_;  // [N,3]
+  Buffer<Affine> transforms_;       // [J] scratch
+};
+
+}  // namespace figurine
