@@ -30,9 +30,9 @@ void blend_transforms(const HeadFrame& frame, uint32_t texel, Scalar* m) {
 template <class Scalar>
 struct Decoded {
   Scalar blended[12];
-  Scalar quaternion[4];  // unit
+  Scalar quaternion[4];   // unit
   Scalar inverse_length;  // of the unnormalised quaternion; 0 if it was not usable
-  Scalar rotated[9];     // A R
+  Scalar rotated[9];      // A R
   Scalar scale[3];
   bool scale_clamped[3];
 };
@@ -102,7 +102,8 @@ Scalar sigmoid(Scalar x) {
 }
 
 void check(const HeadFrame& frame) {
-  FIG_CHECK(frame.body != nullptr && frame.texel_position_m.size() == frame.body->texel_position_m.size(), "one canonical position per texel");
+  FIG_CHECK(frame.body != nullptr && frame.texel_position_m.size() == frame.body->texel_position_m.size(),
+            "one canonical position per texel");
   FIG_CHECK(frame.world_from_rest.size() == frame.body->joint_count(), "one skinning transform per joint");
   FIG_CHECK(frame.decoding.sh_degree <= kMaxShDegree, "SH degree");
 }
@@ -130,7 +131,8 @@ void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads, G
       Decoded<Scalar> decoded;
       decode_texel(frame, i, h, decoded);
       Scalar canonical[3];
-      for (int k = 0; k < 3; ++k) canonical[k] = Scalar(frame.texel_position_m[3 * size_t(i) + k]) + Scalar(frame.decoding.offset_scale_m) * h[k];
+      for (int k = 0; k < 3; ++k)
+        canonical[k] = Scalar(frame.texel_position_m[3 * size_t(i) + k]) + Scalar(frame.decoding.offset_scale_m) * h[k];
       for (int r = 0; r < 3; ++r) {
         const Scalar* row = &decoded.blended[4 * r];
         gaussians.position_m[3 * size_t(i) + r] = (row[0] * canonical[0] + row[1] * canonical[1]) + (row[2] * canonical[2] + row[3]);
@@ -155,7 +157,8 @@ void decode_head_backward(const HeadFrame& frame, const Scalar* head, const Gaus
       const Scalar* const dp = &gradients.position_m[3 * size_t(i)];
       const Scalar* const df = &gradients.covariance_factor[9 * size_t(i)];
       const Scalar* const dsh = &gradients.sh[size_t(i) * sh_values];
-      // Most Gaussians of a view are hidden: their gradients are exactly zero, and so are the outputs' (also where an output is not finite).
+      // Most Gaussians of a view are hidden: their gradients are exactly zero, and so are the outputs' (also where an output is not
+      // finite).
       const auto zero = [](const Scalar* values, size_t n) { return std::all_of(values, values + n, [](Scalar v) { return v == 0; }); };
       if (zero(dp, 3) && zero(df, 9) && gradients.opacity[i] == 0 && zero(dsh, sh_values)) continue;
       const Scalar* h = head + size_t(frame.body->texel[i]) * channels;

@@ -1,7 +1,7 @@
 // One Gaussian through one camera and back: EWA projection, colour from spherical harmonics, and the analytic gradient of both.
 //
-// Equations and letters are those of docs/numerics.md, "Splatting": view point v, tangents (tx, ty) clamped in the Jacobian only, G = R F, rows u and v of
-// the projected 2x3 factor, a = u.u + e, b = u.v, c = v.v + e, determinant by Cauchy-Binet. The blend's parameters are
+// Equations and letters are those of docs/numerics.md, "Splatting": view point v, tangents (tx, ty) clamped in the Jacobian only, G = R F,
+// rows u and v of the projected 2x3 factor, a = u.u + e, b = u.v, c = v.v + e, determinant by Cauchy-Binet. The blend's parameters are
 //   power = -(P (dx - K dy)^2 + Q dy^2),   P = c / (2 det), K = b / c, Q = 1 / (2 c).
 // Based on: Zwicker et al., EWA Splatting, 2002, eq. 22-31.
 #pragma once
@@ -42,10 +42,10 @@ struct ProjectionCamera {
 
 template <class Scalar>
 struct Projected {
-  float depth;          // sort key
-  Scalar view[3];       // v
-  Scalar tangent[2];    // clamped
-  bool clamped[2];      // whether the clamp moved them
+  float depth;            // sort key
+  Scalar view[3];         // v
+  Scalar tangent[2];      // clamped
+  bool clamped[2];        // whether the clamp moved them
   Scalar view_factor[9];  // G
   Scalar row_x[3], row_y[3], minors[3];
   Scalar mean[2], a, b, c, determinant;
@@ -73,7 +73,8 @@ void sh_basis(uint32_t degree, Scalar x, Scalar y, Scalar z, Scalar* basis, Scal
   set(7, c2[3] * xz, c2[3] * z, 0, c2[3] * x);
   set(8, c2[4] * (xx - yy), 2 * c2[4] * x, -2 * c2[4] * y, 0);
   if (degree < 3) return;
-  const Scalar c3[7] = {Scalar(kSh3[0]), Scalar(kSh3[1]), Scalar(kSh3[2]), Scalar(kSh3[3]), Scalar(kSh3[4]), Scalar(kSh3[5]), Scalar(kSh3[6])};
+  const Scalar c3[7] = {Scalar(kSh3[0]), Scalar(kSh3[1]), Scalar(kSh3[2]), Scalar(kSh3[3]),
+                        Scalar(kSh3[4]), Scalar(kSh3[5]), Scalar(kSh3[6])};
   set(9, c3[0] * y * (3 * xx - yy), c3[0] * 6 * xy, c3[0] * 3 * (xx - yy), 0);
   set(10, c3[1] * xy * z, c3[1] * yz, c3[1] * xz, c3[1] * xy);
   set(11, c3[2] * y * (4 * zz - xx - yy), c3[2] * -2 * xy, c3[2] * (4 * zz - xx - 3 * yy), c3[2] * 8 * yz);
@@ -122,9 +123,10 @@ bool project(const ProjectionCamera<Scalar>& camera, const Scalar* position, con
   out.a = uu + e;
   out.b = uv;
   out.c = vv + e;
-  out.determinant = (out.minors[0] * out.minors[0] + out.minors[1] * out.minors[1] + out.minors[2] * out.minors[2]) + (e * (uu + vv) + e * e);
-  return std::isfinite(out.determinant) && std::isfinite(out.a) && std::isfinite(out.b) && std::isfinite(out.c) && std::isfinite(out.mean[0]) &&
-         std::isfinite(out.mean[1]);
+  out.determinant =
+      (out.minors[0] * out.minors[0] + out.minors[1] * out.minors[1] + out.minors[2] * out.minors[2]) + (e * (uu + vv) + e * e);
+  return std::isfinite(out.determinant) && std::isfinite(out.a) && std::isfinite(out.b) && std::isfinite(out.c) &&
+         std::isfinite(out.mean[0]) && std::isfinite(out.mean[1]);
 }
 
 // dL/d of mean, P, K and Q.
@@ -141,7 +143,8 @@ void project_backward(const ProjectionCamera<Scalar>& camera, const Projected<Sc
   // P = c / (2 det), K = b / c, Q = 1 / (2 c)
   const Scalar d_det = -gradient.p * at.c * Scalar(0.5) * inverse_det * inverse_det;
   const Scalar d_b = gradient.k * inverse_c;
-  const Scalar d_c = gradient.p * Scalar(0.5) * inverse_det - gradient.k * at.b * inverse_c * inverse_c - gradient.q * Scalar(0.5) * inverse_c * inverse_c;
+  const Scalar d_c =
+      gradient.p * Scalar(0.5) * inverse_det - gradient.k * at.b * inverse_c * inverse_c - gradient.q * Scalar(0.5) * inverse_c * inverse_c;
   // det = n.n + e (u.u + v.v) + e^2 with n = u x v; b = u.v; c = v.v + e
   const Scalar *u = at.row_x, *v = at.row_y, *n = at.minors;
   const Scalar e = Scalar(kDilationPx2);
@@ -199,8 +202,8 @@ bool sh_colour(const ProjectionCamera<Scalar>& camera, uint32_t degree, const Sc
 
 // Gradient to SH (overwritten) and, through the direction, to the position (added). A channel that was cut at 0 has no gradient.
 template <class Scalar>
-void sh_colour_backward(const ProjectionCamera<Scalar>& camera, uint32_t degree, const Scalar* position, const Scalar* sh, const Scalar* rgb,
-                        const Scalar* rgb_gradient, Scalar* sh_gradient, Scalar* position_gradient) {
+void sh_colour_backward(const ProjectionCamera<Scalar>& camera, uint32_t degree, const Scalar* position, const Scalar* sh,
+                        const Scalar* rgb, const Scalar* rgb_gradient, Scalar* sh_gradient, Scalar* position_gradient) {
   Scalar basis[16], derivative[16][3], direction[3] = {0, 0, 1}, inverse = 0;
   if (degree > 0) {
     for (int k = 0; k < 3; ++k) direction[k] = position[k] - camera.centre[k];

@@ -1,6 +1,7 @@
 // The inner loops of the splatter: one tile of 32x32 pixels at a time, compiled once per instruction set (splat_kernels.inc).
 //
-// Plain structs only: an inline function of a shared header that was compiled for AVX-512 could become the baseline build's copy at link time.
+// Plain structs only: an inline function of a shared header that was compiled for AVX-512 could become the baseline build's copy at link
+// time.
 #pragma once
 
 #include <stdint.h>
@@ -13,7 +14,8 @@ inline constexpr uint32_t kTileBlocks = 64;  // bit 8 row + column of a mask
 inline constexpr uint32_t kBlockPixels = 16;
 inline constexpr uint32_t kPairSums = 9;
 
-// One projected Gaussian. alpha(x,y) = min(0.99, 2^(log2_opacity - (p t^2 + q dy^2))), t = dx - k dy: a sum of squares, so needles do not cancel.
+// One projected Gaussian. alpha(x,y) = min(0.99, 2^(log2_opacity - (p t^2 + q dy^2))), t = dx - k dy: a sum of squares, so needles do not
+// cancel.
 template <class Scalar>
 struct SplatRecord {
   Scalar mean_x, mean_y;  // pixels, absolute in the image
@@ -39,8 +41,8 @@ struct TileJob {
   const SplatRecord<Scalar>* records;
   SplatPair* pairs;  // [count] front to back
   uint32_t count;
-  uint64_t plane;     // scalars from one plane of the image to the next
-  uint64_t row;       // scalars from one row to the next
+  uint64_t plane;  // scalars from one plane of the image to the next
+  uint64_t row;    // scalars from one row to the next
 };
 
 template <class Scalar>

@@ -1,5 +1,6 @@
 // The splatter's kernels for AVX-512 (x86-64-v4).
 #include <immintrin.h>
+
 #include "toolchain/model/splat_kernels.h"
 
 #define FIG_KERNEL_NAMESPACE avx512

@@ -87,8 +87,8 @@ struct Splatter<Scalar>::Impl {
   std::vector<TileBox> boxes;                // [n]
   std::vector<uint32_t> depth_keys;          // [n] kNotVisible: left out
   std::vector<SortItem> order, sort_scratch;
-  std::vector<uint32_t> tile_first, tile_cursor;   // [tiles + 1]
-  std::vector<SplatPair> pairs;                    // by tile, front to back
+  std::vector<uint32_t> tile_first, tile_cursor;        // [tiles + 1]
+  std::vector<SplatPair> pairs;                         // by tile, front to back
   std::vector<uint32_t> slots, slot_first, slot_count;  // pairs of Gaussian i: slots[slot_first[i] .. + slot_count[i])
   std::vector<uint64_t> tile_evaluations;
   std::vector<Scalar> pair_sums;  // [pairs, kPairSums]
@@ -128,8 +128,8 @@ void Splatter<Scalar>::Impl::project_chunk(uint32_t begin, uint32_t end) {
     record.red = rgb[0];
     record.green = rgb[1];
     record.blue = rgb[2];
-    boxes[i] = {tile_of(std::ceil(left), crop.width), static_cast<uint16_t>(tile_of(right, crop.width) + 1), tile_of(std::ceil(top), crop.height),
-                static_cast<uint16_t>(tile_of(bottom, crop.height) + 1)};
+    boxes[i] = {tile_of(std::ceil(left), crop.width), static_cast<uint16_t>(tile_of(right, crop.width) + 1),
+                tile_of(std::ceil(top), crop.height), static_cast<uint16_t>(tile_of(bottom, crop.height) + 1)};
     depth_keys[i] = std::bit_cast<uint32_t>(at.depth);
   }
 }

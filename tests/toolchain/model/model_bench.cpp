@@ -1,4 +1,5 @@
-// figurine_model_bench: milliseconds of every part of a training iteration at the `edge` setting (medians of interleaved rounds). Not a test.
+// figurine_model_bench: milliseconds of every part of a training iteration at the `edge` setting (medians of interleaved rounds). Not a
+// test.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -33,7 +34,8 @@ int main(int argc, char** argv) {
   const int rounds = argc > 2 ? std::atoi(argv[2]) : 30;
   const testing::SyntheticBody capsule(128, 77);
   const std::vector<Affine> transforms = capsule.bent();
-  Camera camera = *make_orbit_camera({.azimuth_deg = 20, .elevation_deg = 5, .distance_m = 3, .vertical_fov_deg = 34, .target_m = {0, 0.87f, 0}}, 512, 512);
+  Camera camera = *make_orbit_camera(
+      {.azimuth_deg = 20, .elevation_deg = 5, .distance_m = 3, .vertical_fov_deg = 34, .target_m = {0, 0.87f, 0}}, 512, 512);
   const HeadFrame frame{.body = &capsule.body, .texel_position_m = capsule.position, .world_from_rest = transforms, .decoding = {}};
   std::mt19937 random(1);
   std::normal_distribution<float> normal;

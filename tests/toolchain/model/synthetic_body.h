@@ -1,4 +1,5 @@
-// A body of texels without a mesh, for the model's tests and its bench: a capsule 1.75 m tall that faces +z, with a bent three-joint skeleton.
+// A body of texels without a mesh, for the model's tests and its bench: a capsule 1.75 m tall that faces +z, with a bent three-joint
+// skeleton.
 #pragma once
 
 #include <cmath>
@@ -38,9 +39,21 @@ struct SyntheticBody {
         }
       }
     }
-    body = {.name = "capsule", .uv_size = uv_size, .joint_names = {"a", "b", "c"}, .parents = parents, .joint_position_m = joints,
-            .joint_shape_basis_m = {}, .texel = texel, .texel_position_m = position, .texel_normal = normal, .texel_joints = texel_joints,
-            .texel_weights = weights, .texel_spacing_m = spacing, .texel_shape_basis_m = {}, .border_texel = {}, .border_source = {}};
+    body = {.name = "capsule",
+            .uv_size = uv_size,
+            .joint_names = {"a", "b", "c"},
+            .parents = parents,
+            .joint_position_m = joints,
+            .joint_shape_basis_m = {},
+            .texel = texel,
+            .texel_position_m = position,
+            .texel_normal = normal,
+            .texel_joints = texel_joints,
+            .texel_weights = weights,
+            .texel_spacing_m = spacing,
+            .texel_shape_basis_m = {},
+            .border_texel = {},
+            .border_source = {}};
   }
   SyntheticBody(const SyntheticBody&) = delete;
 
