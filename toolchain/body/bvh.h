@@ -1,0 +1,40 @@
+// Reads BVH motion capture files: a joint hierarchy with Euler channels, and frames of channel values. For untrusted input.
+//
+// Based on: the Biovision hierarchy as written down by Meredith and Maddock, Motion Capture File Formats Explained, 2001.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace figurine::body {
+
+enum class BvhChannel : uint8_t { kXPosition, kYPosition, kZPosition, kXRotation, kYRotation, kZRotation };
+
+struct BvhJoint {
+  std::string name;
+  int parent = -1;                        // parents come before children
+  std::array<double, 3> offset{0, 0, 0};  // from the parent, in the file's unit
+  std::vector<BvhChannel> channels;       // in file order: rotations multiply left to right
+  size_t first_channel = 0;               // column of its first channel
+  std::array<double, 3> end_offset{0, 0, 0};
+  bool has_end = false;  // an End Site
+};
+
+struct Bvh {
+  std::vector<BvhJoint> joints;
+  uint32_t frame_count = 0;
+  double frame_time_s = 0;
+  size_t channel_count = 0;
+  std::vector<float> values;  // [frame_count, channel_count] degrees and units
+
+  int find(const std::string& joint_name) const;  // -1 if there is none
+};
+
+// Limits: 1024 joints, 64 deep, 2^26 values, magnitudes to 1e6, frame time from 1 ms to 1 s. InputError naming `where`, line and reason.
+Bvh parse_bvh(std::string_view text, const std::string& where);
+Bvh read_bvh(const std::string& path);
+
+}  // namespace figurine::body

@@ -1,0 +1,105 @@
+// figurine-train motion: a captured clip, moved onto a body's skeleton, becomes a motion package.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "formats/writer/package_writer.h"
+#include "ports/linux/files.h"
+#include "toolchain/body/retarget.h"
+#include "toolchain/cli/commands.h"
+#include "toolchain/error.h"
+
+namespace figurine::cli {
+namespace {
+
+struct MotionOptions {
+  std::string clip;
+  std::string body;
+  std::string output;
+  body::RetargetOptions retarget;
+  std::string source;
+  uint32_t start = 0;
+  uint32_t frames = 0;
+  std::string neutral = "first";
+  std::string up = "z";
+};
+
+constexpr const char* kCmuSource =
+    "CMU Graphics Lab Motion Capture Database, BVH conversion by B. Hahne: free for research and commercial use; created with funding from "
+    "NSF EIA-0196217";
+
+void run_motion(MotionOptions options, bool has_start, bool has_frames) {
+  const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), options.body);
+  const Package package = value_or_throw(Package::open(file.bytes(), options.body), options.body);
+  if (package.kind() != PackageKind::kBody) throw InputError(options.body + ": a " + to_string(package.kind()) + " package, not a body");
+
+  const std::filesystem::path path(options.clip);
+  const std::string extension = path.extension().string();
+  body::RetargetOptions& retarget = options.retarget;
+  if (retarget.name.empty()) retarget.name = path.stem().string();
+  if (has_start) retarget.start = options.start;
+  if (has_frames) retarget.frames = options.frames;
+  retarget.neutral = options.neutral == "zero" ? body::Neutral::kZeroPose : body::Neutral::kFirstFrame;
+  retarget.z_up = options.up == "z";
+
+  body::RetargetReport report;
+  body::MotionClip clip;
+  if (extension == ".bvh") {
+    clip = body::retarget_bvh(body::read_bvh(options.clip), package.body(), retarget, &report);
+  } else if (extension == ".npz") {
+    clip = body::retarget_npz(options.clip, package.body(), retarget, &report);
+  } else if (extension == ".glb") {
+    throw InputError(options.clip + ": unsupported: .glb animations are not read by this version; use .bvh or .npz");
+  } else {
+    throw InputError(options.clip + ": unsupported: the name must end in .bvh or .npz");
+  }
+
+  Provenance provenance;
+  provenance.tool = "figurine-train " FIGURINE_VERSION;
+  provenance.settings = {{"command", "motion " + path.filename().string()},
+                         {"body", format_hash(package.content_hash())},
+                         {"start", std::to_string(retarget.start.value_or(0))},
+                         {"smooth_s", std::to_string(retarget.smooth_s)}};
+  if (!options.source.empty()) {
+    provenance.sources = {options.source};
+  } else if (extension == ".bvh") {
+    provenance.sources = {path.filename().string() + ": " + kCmuSource};
+  } else {
+    provenance.sources = {path.filename().string() + ": supplied by the user"};
+  }
+  const auto bytes = value_or_throw(write_package(clip.view(), provenance), options.output);
+  throw_if_error(ports::write_file_atomically(options.output, bytes), "-o");
+  std::printf(
+      "%s: %u frames at %g a second, soles %.1f mm from the ground on average (lowest %.1f), largest step of a joint %.1f degrees, %zu "
+      "bytes\n",
+      options.output.c_str(), clip.frame_count, double{clip.frames_per_second}, 1e3 * double{report.mean_contact_m},
+      1e3 * double{report.lowest_sole_m}, 57.29578 * double{report.largest_step_rad}, bytes.size());
+}
+
+}  // namespace
+
+void add_motion_command(CLI::App& app) {
+  auto options = std::make_shared<MotionOptions>();
+  CLI::App* command = app.add_subcommand("motion", "Move a captured clip (.bvh, .npz) onto a body");
+  command->add_option("clip", options->clip, "CLIP.bvh with CMU's joint names, or an AMASS-style CLIP.npz")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("--body", options->body, "BODY.fgn")->required()->check(CLI::ExistingFile);
+  command->add_option("-o,--output", options->output, "MOTION.fgn")->required();
+  command->add_option("--fps", options->retarget.frames_per_second, "Frames a second of the result")->check(CLI::Range(1.0, 240.0));
+  const CLI::Option* start =
+      command->add_option("--start", options->start, "First frame of the clip, counted as in the file; default: after the neutral frame");
+  const CLI::Option* frames =
+      command->add_option("--frames", options->frames, "Frames of the result; default: to the end")->check(CLI::PositiveNumber);
+  command->add_option("--name", options->retarget.name, "Name of the motion; default: the file's");
+  command->add_option("--smooth", options->retarget.smooth_s, "Standard deviation of the smoothing over time, seconds")
+      ->check(CLI::Range(0.0, 0.5));
+  command->add_option("--neutral", options->neutral, "BVH: the T-pose is the first frame or the zero pose")
+      ->check(CLI::IsMember({"first", "zero"}));
+  command->add_option("--up", options->up, "NPZ: the world's up axis")->check(CLI::IsMember({"z", "y"}));
+  command->add_option("--source", options->source, "Provenance line: where the clip is from and under which terms");
+  command->callback([options, start, frames] { run_motion(*options, start->count() > 0, frames->count() > 0); });
+}
+
+}  // namespace figurine::cli
