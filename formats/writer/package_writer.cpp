@@ -2,11 +2,17 @@
 
 #include <cstring>
 
+#include "formats/src/package_text.h"
 #include "formats/writer/package_parts.h"
 
 namespace figurine {
 
 namespace {
+
+// How messages call the thing being written: by its name, if that can be printed.
+std::string describe(const char* kind, const std::string& name) {
+  return is_clean_text(name, false) ? std::string(kind) + " '" + name + "'" : std::string(kind);
+}
 
 // Nothing leaves the writer that the reader would refuse.
 Result<std::vector<std::byte>> assemble_and_verify(Result<PackageParts> parts, const std::string& name) {
@@ -25,15 +31,15 @@ AlignedBytes::AlignedBytes(std::span<const std::byte> source) : storage_(source.
 }
 
 Result<std::vector<std::byte>> write_package(const Body& body, const Provenance& provenance) {
-  return assemble_and_verify(take_apart(body, provenance), "body '" + body.name + "'");
+  return assemble_and_verify(take_apart(body, provenance), describe("body", body.name));
 }
 
 Result<std::vector<std::byte>> write_package(const Avatar& avatar, const Budget& budget, const Provenance& provenance) {
-  return assemble_and_verify(take_apart(avatar, budget, provenance), "avatar '" + avatar.name + "'");
+  return assemble_and_verify(take_apart(avatar, budget, provenance), describe("avatar", avatar.name));
 }
 
 Result<std::vector<std::byte>> write_package(const Motion& motion, const Provenance& provenance) {
-  return assemble_and_verify(take_apart(motion, provenance), "motion '" + motion.name + "'");
+  return assemble_and_verify(take_apart(motion, provenance), describe("motion", motion.name));
 }
 
 }  // namespace figurine

@@ -1,0 +1,145 @@
+#include "formats/package_bytes.h"
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "formats/src/checksum.h"
+#include "formats/writer/package_writer.h"
+
+namespace figurine::samples {
+
+ExactBytes::ExactBytes(std::span<const std::byte> source) {
+  void* memory = nullptr;
+  FIG_CHECK(posix_memalign(&memory, kBlobAlignment, source.size()) == 0, "out of memory");
+  if (!source.empty()) std::memcpy(memory, source.data(), source.size());
+  bytes_ = {static_cast<std::byte*>(memory), source.size()};
+}
+
+ExactBytes::~ExactBytes() { std::free(bytes_.data()); }
+
+GuardedBytes::GuardedBytes(size_t capacity) {
+  const size_t page = static_cast<size_t>(sysconf(_SC_PAGESIZE));
+  const size_t inner = (capacity + page - 1) / page * page;
+  map_bytes_ = inner + 2 * page;
+  void* map = mmap(nullptr, map_bytes_, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  FIG_CHECK(map != MAP_FAILED, "mmap failed");
+  map_ = static_cast<std::byte*>(map);
+  FIG_CHECK(mprotect(map_ + page, inner, PROT_READ | PROT_WRITE) == 0, "mprotect failed");
+  end_ = map_ + page + inner;
+}
+
+GuardedBytes::~GuardedBytes() { munmap(map_, map_bytes_); }
+
+Seal::Seal(std::span<const std::byte> sound_package) {
+  const AlignedBytes copy(sound_package);
+  const Result<Package> package = Package::open(copy.bytes(), "sample");
+  FIG_CHECK(package.ok(), package.status().message().c_str());
+  const layout::Header header = get_header(sound_package);
+  for (const TensorInfo& tensor : package->tensors()) {
+    const uint64_t extent[3] = {tensor.offset_bytes, tensor.size_bytes, tensor.checksum};
+    const std::byte* begin = sound_package.data() + header.index_offset;
+    const void* found = memmem(begin, header.index_bytes, extent, sizeof(extent));
+    FIG_CHECK(found != nullptr, "the extent is in the index");
+    extents_.push_back(static_cast<size_t>(static_cast<const std::byte*>(found) - sound_package.data()));
+  }
+}
+
+void Seal::renew(std::span<std::byte> bytes) const {
+  for (size_t at : extents_) {
+    if (at + 24 > bytes.size()) continue;
+    const uint64_t offset = get_u64(bytes, at), size = get_u64(bytes, at + 8);
+    if (offset <= bytes.size() && size <= bytes.size() - offset) put_u64(bytes, at + 16, xxh3_64(bytes.subspan(offset, size)));
+  }
+  if (bytes.size() < kPackageHeaderBytes) return;
+  layout::Header header = get_header(bytes);
+  if (header.index_offset <= bytes.size() && header.index_bytes <= bytes.size() - header.index_offset) {
+    header.index_checksum = xxh3_64(bytes.subspan(header.index_offset, header.index_bytes));
+  }
+  put_header(bytes, header);
+}
+
+layout::Header get_header(std::span<const std::byte> bytes) {
+  layout::Header header;
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  return header;
+}
+
+void put_header(std::span<std::byte> bytes, layout::Header header) {
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  header.header_checksum = xxh3_64(bytes.first(layout::kSealedHeaderBytes));
+  std::memcpy(bytes.data(), &header, sizeof(header));
+}
+
+void put_u64(std::span<std::byte> bytes, size_t at, uint64_t value) { std::memcpy(bytes.data() + at, &value, sizeof(value)); }
+
+uint64_t get_u64(std::span<const std::byte> bytes, size_t at) {
+  uint64_t value = 0;
+  std::memcpy(&value, bytes.data() + at, sizeof(value));
+  return value;
+}
+
+namespace {
+
+bool all_finite(std::span<const float> values) {
+  for (float value : values) {
+    if (!std::isfinite(value)) return false;
+  }
+  return true;
+}
+
+bool exercise_body(const Body& body, std::string& reason) {
+  std::vector<float> rotations(size_t{body.joint_count()} * 4, 0.5f);
+  std::vector<Affine> scratch(body.joint_count());
+  std::vector<float> maps(size_t{body.uv_size} * body.uv_size * kMapChannels, std::nanf(""));
+  draw_pose_maps(body, {{0, 0, 0}, rotations}, MapStatistics{}, scratch, kMapChannels, maps);
+  const std::vector<float> shape(body.shape_count(), 0.5f);
+  std::vector<float> joints(body.joint_position_m.size()), texels(body.texel_position_m.size());
+  shape_body(body, shape, joints, texels);
+  reason = "a posed map or a shaped texel is not finite";
+  return all_finite(maps) && all_finite(joints) && all_finite(texels);
+}
+
+bool exercise_avatar(const Avatar& avatar, std::string& reason) {
+  reason = "shapes or weights of the network";
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, true);
+  if (!shapes.ok() || shapes->back().channels != head_channels(avatar.decoding.sh_degree)) return false;
+  for (const Layer& layer : avatar.network.layers) {
+    if (!all_finite(layer.weights) || !all_finite(layer.bias)) return false;
+  }
+  reason = "shape or pose statistics";
+  const size_t features = avatar.pose_statistics.joints.size() * 3;
+  if (avatar.pose_statistics.mean.size() != features || avatar.pose_statistics.covariance.size() != features * features) return false;
+  if (!all_finite(avatar.shape) || !all_finite(avatar.pose_statistics.mean) || !all_finite(avatar.pose_statistics.covariance)) return false;
+  reason = "golden frame";
+  if (avatar.golden.rotations.empty()) return avatar.golden.png.empty();
+  const uint32_t joints = static_cast<uint32_t>(avatar.golden.rotations.size() / 4);
+  return validate_camera(avatar.golden.camera).ok() &&
+         validate_pose({avatar.golden.root_translation_m, avatar.golden.rotations}, joints).ok();
+}
+
+}  // namespace
+
+bool exercise(const Package& package, std::string& reason) {
+  switch (package.kind()) {
+    case PackageKind::kBody:
+      return exercise_body(package.body(), reason);
+    case PackageKind::kAvatar:
+      return exercise_avatar(package.avatar(), reason);
+    case PackageKind::kMotion: {
+      const Motion& motion = package.motion();
+      reason = "a pose";
+      for (uint32_t frame = 0; frame < motion.frame_count; ++frame) {
+        if (!validate_pose(motion.pose(frame), static_cast<uint32_t>(motion.joint_names.size())).ok()) return false;
+      }
+      return true;
+    }
+  }
+  reason = "an unknown kind";
+  return false;
+}
+
+}  // namespace figurine::samples
