@@ -1,21 +1,35 @@
-// figurine-train: the offline commands. Only this folder catches exceptions: exit 1 bad input, 2 usage, 3 bug.
+// figurine-train: the offline commands. Only this folder catches exceptions: exit 1 bad input, 2 usage, 3 bug, 130 interrupted (state
+// saved).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
+#include "toolchain/train/interrupt.h"
 
 int main(int argc, char** argv) {
   CLI::App app{"figurine-train: bodies, captures, avatars and packages, offline"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "figurine-train " FIGURINE_VERSION);
+#ifdef FIGURINE_COMMAND_BODY
   figurine::cli::add_body_command(app);
+#endif
+#ifdef FIGURINE_COMMAND_MOTION
   figurine::cli::add_motion_command(app);
+#endif
+#ifdef FIGURINE_COMMAND_CAPTURE
   figurine::cli::add_capture_command(app);
+#endif
+#ifdef FIGURINE_COMMAND_AVATAR
   figurine::cli::add_avatar_command(app);
+#endif
+#ifdef FIGURINE_COMMAND_PACK
   figurine::cli::add_pack_command(app);
+#endif
+#ifdef FIGURINE_COMMAND_EVALUATE
   figurine::cli::add_evaluate_command(app);
+#endif
   try {
     app.parse(argc, argv);
     return 0;
@@ -24,6 +38,9 @@ int main(int argc, char** argv) {
   } catch (const figurine::InputError& error) {
     std::fprintf(stderr, "figurine-train: %s\n", error.what());
     return 1;
+  } catch (const figurine::train::Interrupted& interrupted) {
+    std::fprintf(stderr, "figurine-train: %s\n", interrupted.what());
+    return 130;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "figurine-train: internal error: %s\n", error.what());
     return 3;

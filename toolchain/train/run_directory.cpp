@@ -211,6 +211,16 @@ std::string utc_now() {
   return text;
 }
 
+std::string current_command() {
+  std::ifstream file("/proc/self/cmdline", std::ios::binary);
+  std::string command, argument;
+  while (std::getline(file, argument, '\0')) {
+    if (command.empty()) argument = std::filesystem::path(argument).filename().string();
+    command += (command.empty() ? "" : " ") + (argument.find(' ') == std::string::npos ? argument : "'" + argument + "'");
+  }
+  return command;
+}
+
 std::string current_commit() {
   if (const char* given = std::getenv("FIGURINE_COMMIT"); given != nullptr && *given != 0) return given;
   std::error_code error;

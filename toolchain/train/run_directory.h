@@ -69,7 +69,8 @@ void write_json(const std::string& path, const nlohmann::json& json);
 
 // CPU model, cores, operating system: beside every figure.
 nlohmann::json describe_machine();
-std::string utc_now();         // 2026-01-31T12:00:00Z
-std::string current_commit();  // $FIGURINE_COMMIT, or .git's of the working directory; "unknown" otherwise
+std::string utc_now();          // 2026-01-31T12:00:00Z
+std::string current_command();  // the command line of this process, its program by file name alone
+std::string current_commit();   // $FIGURINE_COMMIT, or .git's of the working directory; "unknown" otherwise
 
 }  // namespace figurine::train

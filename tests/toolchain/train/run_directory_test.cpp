@@ -1,0 +1,169 @@
+// Files of a run: what is written reads back equal, and what is damaged is refused with a reason.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "toolchain/error.h"
+#include "toolchain/train/run_directory.h"
+
+namespace figurine::train {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RunDirectoryTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("figurine_run_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  std::string read_error(const std::string& file) {
+    try {
+      read_tensor_file(file);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  fs::path folder_;
+};
+
+TensorFile example() {
+  TensorFile file;
+  file.metadata["note"] = "ten \"quoted\" words";
+  file.tensors["a"] = {{2, 3}, {1, 2, 3, 4, 5, -0.0f}};
+  file.tensors["b"] = {{1}, {std::nextafter(1.0f, 2.0f)}};
+  file.tensors["empty"] = {{0, 4}, {}};
+  return file;
+}
+
+TEST_F(RunDirectoryTest, TensorFileReadsBackToTheBit) {
+  write_tensor_file(path("x.safetensors"), example());
+  const TensorFile read = read_tensor_file(path("x.safetensors"));
+  EXPECT_EQ(read.metadata, example().metadata);
+  ASSERT_EQ(read.tensors.size(), 3u);
+  EXPECT_EQ(read.tensors.at("a").shape, (std::vector<int64_t>{2, 3}));
+  EXPECT_EQ(read.tensors.at("b").values[0], std::nextafter(1.0f, 2.0f));
+  EXPECT_TRUE(std::signbit(read.tensors.at("a").values[5]));
+}
+
+TEST_F(RunDirectoryTest, TensorFileRefusesEveryPrefix) {
+  write_tensor_file(path("x.safetensors"), example());
+  std::ifstream file(path("x.safetensors"), std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  for (size_t length = 0; length < bytes.size(); ++length) {
+    std::ofstream(path("cut"), std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(length));
+    ASSERT_NE(read_error(path("cut")), "") << "prefix of " << length << " bytes was accepted";
+  }
+}
+
+TEST_F(RunDirectoryTest, TensorFileNamesWhatIsWrong) {
+  EXPECT_NE(read_error(path("absent")).find("absent"), std::string::npos);
+  const auto write = [&](const std::string& header, size_t data_bytes, float value = 0) {
+    std::ofstream file(path("bad"), std::ios::binary);
+    const uint64_t length = header.size();
+    file.write(reinterpret_cast<const char*>(&length), 8);
+    file << header;
+    for (size_t i = 0; i < data_bytes / 4; ++i) file.write(reinterpret_cast<const char*>(&value), 4);
+  };
+  write(R"({"w": {"dtype": "F16", "shape": [2], "data_offsets": [0, 4]}})", 4);
+  EXPECT_NE(read_error(path("bad")).find("tensor w: dtype"), std::string::npos);
+  write(R"({"w": {"dtype": "F32", "shape": [2], "data_offsets": [0, 4]}})", 4);
+  EXPECT_NE(read_error(path("bad")).find("tensor w: shape"), std::string::npos);
+  write(R"({"w": {"dtype": "F32", "shape": [4611686018427387904, 4], "data_offsets": [0, 4]}})", 4);
+  EXPECT_NE(read_error(path("bad")).find("tensor w: shape"), std::string::npos) << "the product overflows 64 bits";
+  write(R"({"w": {"dtype": "F32", "shape": [1], "data_offsets": [0, 4]}})", 4, std::nanf(""));
+  EXPECT_NE(read_error(path("bad")).find("not finite"), std::string::npos);
+}
+
+TEST_F(RunDirectoryTest, CheckpointRestoresWeightsMomentsAndCounters) {
+  const TrainSettings settings = preset_settings("nano");
+  model::PoseUNet unet(make_network(settings), {.seed = 3}), other(make_network(settings), {.seed = 4});
+  model::AdamW adamw(unet.parameter_count(), settings.adamw), restored(unet.parameter_count(), settings.adamw);
+  adamw.first_moment.uniform_(-1, 1);
+  adamw.second_moment.uniform_(0, 1);
+  adamw.steps = 123456;
+  const RunDirectory run{folder_.string()};
+  TrainingState state{.iteration = 123456, .seconds = 1.0 / 3, .stages = {.loss = 0.1}};
+  save_checkpoint(run, state, unet, adamw);
+  const TrainingState read = load_checkpoint(run, other, restored);
+  EXPECT_EQ(read.iteration, state.iteration);
+  EXPECT_EQ(read.seconds, state.seconds);
+  EXPECT_EQ(read.stages.loss, 0.1);
+  EXPECT_EQ(restored.steps, adamw.steps);
+  EXPECT_TRUE(torch::equal(other.weights(), unet.weights()));
+  EXPECT_TRUE(torch::equal(restored.first_moment, adamw.first_moment));
+  EXPECT_TRUE(torch::equal(restored.second_moment, adamw.second_moment));
+}
+
+TEST_F(RunDirectoryTest, WeightsOfAnotherShapeAreRefusedByName) {
+  model::PoseUNet nano(make_network(preset_settings("nano")), {});
+  save_weights({folder_.string()}, nano);
+  TrainSettings wider = preset_settings("nano");
+  wider.fourier_octaves = 0;
+  model::PoseUNet other(make_network(wider), {});
+  try {
+    load_weights(folder_.string(), other);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("layer.0.weight"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(RunDirectoryTest, SettingsReadBackEqual) {
+  TrainSettings settings = preset_settings("paper");
+  settings.template_mode = TemplateMode::kMean;
+  settings.freeze_pose = true;
+  settings.schedule.budget = {.iterations = 77, .seconds = 0};
+  settings.background = TrainingBackground::kRandom;
+  settings.precision = model::Precision::kBfloat16;
+  const nlohmann::json json = to_json(settings);
+  EXPECT_EQ(to_json(settings_from_json(json, "test")), json);
+}
+
+TEST_F(RunDirectoryTest, SettingsNameTheFieldThatIsWrong) {
+  nlohmann::json json = to_json(preset_settings("nano"));
+  json["threads"] = 0;
+  EXPECT_THROW(settings_from_json(json, "run.json"), InputError);
+  json = to_json(preset_settings("nano"));
+  json["background"] = "blue";
+  try {
+    settings_from_json(json, "run.json");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("background"), std::string::npos);
+  }
+}
+
+TEST_F(RunDirectoryTest, LogIsCutAtTheCheckpoint) {
+  const RunDirectory run{folder_.string()};
+  save_log(run, {{50, 1.5, 2e-3, 0.1, 20}, {100, 3.0, 1e-3, 0.05, 25}});
+  EXPECT_EQ(load_log(run, 100).size(), 2u);
+  const std::vector<LogRow> rows = load_log(run, 99);
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0].iteration, 50u);
+  EXPECT_NEAR(rows[0].psnr_db, 20, 1e-3);
+}
+
+TEST_F(RunDirectoryTest, ParameterCountsAreTheDesigns) {
+  const auto count = [](const char* preset, uint32_t octaves) {
+    TrainSettings settings = preset_settings(preset);
+    settings.fourier_octaves = octaves;
+    return model::PoseUNet(make_network(settings), {}).parameter_count();
+  };
+  EXPECT_EQ(count("nano", 0), 9886u);
+  EXPECT_EQ(count("nano", 5), 11326u);
+  EXPECT_EQ(count("edge", 0), 150094u);
+  EXPECT_EQ(count("edge", 5), 155854u);
+  EXPECT_EQ(count("paper", 0), 598011u);
+}
+
+}  // namespace
+}  // namespace figurine::train

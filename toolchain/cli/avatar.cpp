@@ -1,0 +1,178 @@
+// figurine-train avatar: trains one person's UNet, or every person's of a folder.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+
+#include "toolchain/cli/commands.h"
+#include "toolchain/error.h"
+#include "toolchain/train/interrupt.h"
+#include "toolchain/train/progress.h"
+#include "toolchain/train/trainer.h"
+
+namespace figurine::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// As typed; what was not given comes from the preset, or from the run that is resumed.
+struct AvatarArguments {
+  std::string data, body, run;
+  bool all = false, resume = false, quiet = false;
+  std::optional<std::string> preset, init, template_mode, fourier, precision, background;
+  std::optional<uint64_t> seed, iterations;
+  std::optional<double> minutes, learning_rate, weight_decay;
+  std::optional<uint32_t> warmup;
+  bool freeze_pose = false;
+  uint32_t threads = 0;  // 0: all cores
+};
+
+template <class Enum>
+Enum choose(const std::string& text, std::initializer_list<Enum> values) {
+  for (Enum value : values) {
+    if (text == train::to_string(value)) return value;
+  }
+  throw InputError("\"" + text + "\" is unknown");  // CLI11 has checked the words already
+}
+
+void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
+  using train::TrainingBackground;
+  if (arguments.template_mode) settings.template_mode = *arguments.template_mode == "mean" ? TemplateMode::kMean : TemplateMode::kShaped;
+  if (arguments.freeze_pose) settings.freeze_pose = true;
+  if (arguments.fourier) settings.fourier_octaves = *arguments.fourier == "off" ? 0 : 5;
+  if (arguments.seed) settings.seed = *arguments.seed;
+  if (arguments.init) settings.init = *arguments.init;
+  if (arguments.learning_rate) settings.schedule.peak = *arguments.learning_rate;
+  if (arguments.weight_decay) settings.adamw.weight_decay = *arguments.weight_decay;
+  if (arguments.warmup) settings.warmup_iterations = *arguments.warmup;
+  if (arguments.iterations) settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
+  if (arguments.minutes) settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};
+  if (arguments.precision) {
+    settings.precision = *arguments.precision == "auto"
+                             ? train::best_precision()
+                             : choose(*arguments.precision, {model::Precision::kFloat32, model::Precision::kBfloat16});
+  }
+  if (arguments.background) {
+    settings.background =
+        choose(*arguments.background, {TrainingBackground::kBlack, TrainingBackground::kGrey, TrainingBackground::kRandom});
+  }
+}
+
+uint32_t thread_count(uint32_t asked) { return asked > 0 ? asked : std::clamp(std::thread::hardware_concurrency(), 1u, 16u); }
+
+train::TrainRequest make_request(const AvatarArguments& arguments, const std::string& data, const std::string& run) {
+  train::TrainRequest request{.data = data,
+                              .body = arguments.body,
+                              .run = run,
+                              .settings = {},
+                              .command = train::current_command(),
+                              .resume = arguments.resume,
+                              .quiet = arguments.quiet};
+  if (arguments.resume && fs::exists(train::RunDirectory{run}.run_json())) {
+    const train::RunDescription old = train::read_run({run});
+    if (request.data.empty()) request.data = old.data;
+    if (request.body.empty()) request.body = old.body;
+    request.settings = old.settings;
+    if (arguments.preset && *arguments.preset != old.settings.preset)
+      throw InputError(run + ": --preset differs from the run that is resumed");
+    overlay(arguments, request.settings);
+    const nlohmann::json asked = train::to_json(request.settings), was = train::to_json(old.settings);
+    for (const auto& [key, value] : was.items()) {
+      if (asked.at(key) != value)
+        throw InputError(run + ": --resume goes on with the run's own settings; " + key + " differs from run.json");
+    }
+  } else {
+    if (request.data.empty()) throw InputError("--data is needed for a new run");
+    if (request.body.empty()) throw InputError("--body is needed for a new run");
+    request.resume = arguments.resume && !arguments.all;  // with --all, what has not begun begins now
+    request.settings = train::preset_settings(arguments.preset.value_or("edge"));
+    request.settings.precision = train::best_precision();
+    overlay(arguments, request.settings);
+  }
+  request.settings.threads = thread_count(arguments.threads);
+  return request;
+}
+
+void train_one(const AvatarArguments& arguments, const std::string& data, const std::string& run) {
+  const train::TrainRequest request = make_request(arguments, data, run);
+  const train::TrainResult result = train::train_avatar(request);
+  if (arguments.quiet) return;
+  if (result.was_finished) {
+    std::printf("%s: was finished already (%llu iterations)\n", run.c_str(), static_cast<unsigned long long>(result.state.iteration));
+    return;
+  }
+  std::printf("%s: %llu iterations in %s (%.1f a second), training PSNR %.2f dB\n", run.c_str(),
+              static_cast<unsigned long long>(result.state.iteration), train::format_duration(result.state.seconds).c_str(),
+              static_cast<double>(result.state.iteration) / std::max(1e-9, result.state.seconds), result.psnr_db);
+}
+
+void train_all(const AvatarArguments& arguments) {
+  std::vector<std::string> identities;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(arguments.data, error)) {
+    if (entry.is_directory() && fs::exists(entry.path() / "images_lr")) identities.push_back(entry.path().filename().string());
+  }
+  if (error) throw InputError(arguments.data + ": " + error.message());
+  if (identities.empty()) throw InputError(arguments.data + ": holds no identity (a folder with images_lr in it)");
+  std::sort(identities.begin(), identities.end());
+  size_t failed = 0;
+  for (const std::string& identity : identities) {
+    try {
+      train_one(arguments, arguments.data + "/" + identity, arguments.run + "/" + identity);
+    } catch (const InputError& problem) {
+      ++failed;
+      std::fprintf(stderr, "figurine-train: %s: %s\n", identity.c_str(), problem.what());
+    }
+  }
+  if (failed > 0) throw InputError(std::to_string(failed) + " of " + std::to_string(identities.size()) + " identities failed");
+}
+
+}  // namespace
+
+void add_avatar_command(CLI::App& app) {
+  auto arguments = std::make_shared<AvatarArguments>();
+  CLI::App* command = app.add_subcommand("avatar", "Train one person's avatar from a capture");
+  command->add_option("--data", arguments->data, "Folder of one identity (with --all: of identities)");
+  command->add_option("--body", arguments->body, "Body package (figurine-train body)");
+  command->add_option("-o,--output", arguments->run, "Folder of the run (with --all: of runs)")->required();
+  command->add_flag("--all", arguments->all, "Every identity of the folder, one after the other");
+  command->add_flag("--resume", arguments->resume, "Go on from the last checkpoint, by the run's own settings");
+  command->add_flag("--quiet", arguments->quiet, "No progress, no summary");
+  command->add_option("--preset", arguments->preset, "Size of the network (default edge)")->check(CLI::IsMember({"nano", "edge", "paper"}));
+  command->add_option("--init", arguments->init, "Start from these weights (file or run) instead of the common initial ones");
+  command->add_option("--seed", arguments->seed, "Of the order of the images (default 1)");
+  CLI::Option* minutes =
+      command->add_option("--minutes", arguments->minutes, "Train for so long (default 10); the learning rate follows the clock")
+          ->check(CLI::PositiveNumber);
+  command->add_option("--iterations", arguments->iterations, "Train for so many iterations instead")
+      ->check(CLI::PositiveNumber)
+      ->excludes(minutes);
+  command->add_option("--template", arguments->template_mode, "Gaussians sit on the person's own shape (default) or on the mean template")
+      ->check(CLI::IsMember({"shaped", "mean"}));
+  command->add_flag("--freeze-pose", arguments->freeze_pose, "Experiment: the network sees the rest pose in the true root orientation");
+  command->add_option("--fourier", arguments->fourier, "Constant Fourier channels in the input (default: on for nano and edge)")
+      ->check(CLI::IsMember({"on", "off"}));
+  command->add_option("--learning-rate", arguments->learning_rate, "Peak of the schedule (default 2e-3)")->check(CLI::PositiveNumber);
+  command->add_option("--weight-decay", arguments->weight_decay, "AdamW's (default 0)")->check(CLI::NonNegativeNumber);
+  command->add_option("--precision", arguments->precision, "Of the convolutions (default auto: bf16 where the CPU has it)")
+      ->check(CLI::IsMember({"auto", "f32", "bf16"}));
+  command->add_option("--background", arguments->background, "Behind prediction and truth in the loss")
+      ->check(CLI::IsMember({"black", "grey", "random"}));
+  command->add_option("--warmup", arguments->warmup, "Iterations of fitting reference Gaussians first (default 0)");
+  command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->callback([arguments] {
+    if (arguments->all) {
+      if (arguments->data.empty()) throw InputError("--all needs --data");
+      train_all(*arguments);
+    } else {
+      train_one(*arguments, arguments->data, arguments->run);
+    }
+  });
+}
+
+}  // namespace figurine::cli

@@ -1,0 +1,126 @@
+// figurine-train evaluate: how good a trained avatar is (reconstruction), and whether the device draws the same (parity).
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "ports/linux/files.h"
+#include "ports/linux/png.h"
+#include "toolchain/cli/commands.h"
+#include "toolchain/error.h"
+#include "toolchain/evaluate/contact_sheet.h"
+#include "toolchain/evaluate/reconstruction.h"
+#include "toolchain/verify/parity.h"
+
+namespace figurine::cli {
+
+namespace {
+
+struct EvaluateArguments {
+  train::OpenRunOptions open;
+  evaluate::ReconstructionOptions reconstruction;
+  verify::ParityOptions parity;
+  std::string sheet, output, package;
+};
+
+nlohmann::json report_head(const EvaluateArguments& arguments, const train::TrainedAvatar& avatar) {
+  nlohmann::json report{{"command", train::current_command()},
+                        {"commit", train::current_commit()},
+                        {"machine", train::describe_machine()},
+                        {"date", train::utc_now()},
+                        {"run", arguments.open.run},
+                        {"identity", avatar.data().directory()},
+                        {"settings", train::to_json(avatar.description().settings)}};
+  for (const char* key : {"iterations", "train_seconds", "iterations_per_second", "breakdown_ms"}) {
+    if (avatar.description().json.contains(key)) report[key] = avatar.description().json.at(key);
+  }
+  return report;
+}
+
+nlohmann::json finite(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+
+void print_group(const char* title, const nlohmann::json& group) {
+  const auto number = [&](const char* key) { return group.at(key).is_number() ? group.at(key).get<double>() : NAN; };
+  std::printf("%-22s %6.2f dB  flat %6.2f  crop %6.2f  head %6.2f  high-pass %.2f  (%d images)\n", title, number("psnr_db"),
+              number("flat_psnr_db"), number("crop_psnr_db"), number("head_psnr_db"), number("highpass_ratio"),
+              group.at("images").get<int>());
+}
+
+void run_reconstruction(const EvaluateArguments& arguments) {
+  train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
+  nlohmann::json report = report_head(arguments, avatar);
+  report.update(evaluate::evaluate_reconstruction(avatar, arguments.reconstruction));
+  if (!arguments.sheet.empty()) {
+    const ports::ImageU8 sheet = evaluate::make_contact_sheet(avatar, {});
+    throw_if_error(ports::write_file_atomically(arguments.sheet, value_or_throw(ports::encode_png(sheet), arguments.sheet)), "cannot save");
+    report["contact_sheet"] = arguments.sheet;
+  }
+  train::write_json(train::RunDirectory{arguments.open.run}.evaluation(), report);
+  if (!arguments.output.empty()) train::write_json(arguments.output, report);
+  print_group("held-out views", report.at("held_out_views"));
+  print_group("held-out poses", report.at("held_out_poses"));
+  print_group("  interleaved", report.at("held_out_poses_interleaved"));
+  print_group("  block", report.at("held_out_poses_block"));
+  print_group("views and poses", report.at("held_out_views_and_poses"));
+}
+
+void run_parity(const EvaluateArguments& arguments) {
+  train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
+  const train::PackageFile package = train::open_package(arguments.package, PackageKind::kAvatar);
+  const verify::ParityReport parity = verify::compare_with_runtime(avatar, package.package, arguments.parity);
+  nlohmann::json report = report_head(arguments, avatar);
+  report["package"] = arguments.package;
+  report["package_hash"] = format_hash(package.package.content_hash());
+  report["parity_db"] = finite(parity.psnr_db);
+  report["worst_parity_db"] = finite(parity.worst_psnr_db);
+  report["largest_error"] = finite(parity.largest_error);
+  for (const verify::ParityView& view : parity.views) {
+    report["views"].push_back({{"frame", view.frame},
+                               {"camera", view.camera},
+                               {"psnr_db", finite(view.psnr_db)},
+                               {"largest_error", finite(view.largest_error)},
+                               {"foreground_pixels", view.foreground}});
+  }
+  if (!arguments.output.empty()) train::write_json(arguments.output, report);
+  std::printf("parity with the runtime: %.2f dB over %zu pictures (worst %.2f dB), largest error %.2g\n", parity.psnr_db,
+              parity.views.size(), parity.worst_psnr_db, parity.largest_error);
+}
+
+void add_run_options(CLI::App* command, const std::shared_ptr<EvaluateArguments>& arguments) {
+  command->add_option("--run", arguments->open.run, "Folder of a run")->required();
+  command->add_option("--data", arguments->open.data, "Where the data is now (default: where the run found it)");
+  command->add_option("--body", arguments->open.body, "Where the body is now (default: where the run found it)");
+  command->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->add_option("-o,--output", arguments->output, "Report to write, JSON");
+}
+
+}  // namespace
+
+void add_evaluate_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("evaluate", "Measure trained avatars");
+  command->require_subcommand(1);
+  auto arguments = std::make_shared<EvaluateArguments>();
+  arguments->open.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+
+  CLI::App* reconstruction = command->add_subcommand("reconstruction", "Held-out cameras and poses against the truth");
+  add_run_options(reconstruction, arguments);
+  reconstruction->add_option("--sheet", arguments->sheet, "Contact sheet to write, PNG: truth left, prediction right");
+  reconstruction
+      ->add_option("--view-frame-step", arguments->reconstruction.view_frame_step, "Look at every n-th training pose only (default 1: all)")
+      ->check(CLI::PositiveNumber);
+  reconstruction->callback([arguments] { run_reconstruction(*arguments); });
+
+  CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, in float");
+  add_run_options(parity, arguments);
+  parity->add_option("--package", arguments->package, "Avatar package made from the run")->required();
+  parity->add_option("--views", arguments->parity.views, "Held-out pictures to compare (default 12)")->check(CLI::PositiveNumber);
+  parity->callback([arguments] {
+    arguments->parity.threads = arguments->open.threads;
+    run_parity(*arguments);
+  });
+}
+
+}  // namespace figurine::cli

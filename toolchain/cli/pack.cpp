@@ -1,0 +1,83 @@
+// figurine-train pack: a run as an avatar package.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "ports/linux/files.h"
+#include "toolchain/cli/commands.h"
+#include "toolchain/error.h"
+#include "toolchain/train/pack_avatar.h"
+#include "toolchain/verify/parity.h"
+
+namespace figurine::cli {
+
+namespace {
+
+struct PackArguments {
+  train::OpenRunOptions open;
+  train::PackOptions pack;
+  std::string precision = "f32", output;
+};
+
+// Package bytes must be aligned as a memory map is.
+class AlignedCopy {
+ public:
+  explicit AlignedCopy(std::span<const std::byte> bytes) : storage_(bytes.size() + kBlobAlignment) {
+    void* start = storage_.data();
+    size_t space = storage_.size();
+    start_ = static_cast<std::byte*>(std::align(kBlobAlignment, bytes.size(), start, space));
+    size_ = bytes.size();
+    std::copy(bytes.begin(), bytes.end(), start_);
+  }
+  std::span<const std::byte> bytes() const { return {start_, size_}; }
+
+ private:
+  std::vector<std::byte> storage_;
+  std::byte* start_ = nullptr;
+  size_t size_ = 0;
+};
+
+void run(const PackArguments& arguments) {
+  if (arguments.precision != "f32")
+    throw InputError("--precision " + arguments.precision + ": unsupported by this build; packages are f32");
+  train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
+  const train::RunDirectory folder{arguments.open.run};
+  // Written twice: the first copy runs on the device's renderer, which then says how much memory it held.
+  train::PackOptions options = arguments.pack;
+  const AlignedCopy draft(train::pack_avatar(avatar, folder, options));
+  const Package opened = value_or_throw(Package::open(draft.bytes(), arguments.output), arguments.output);
+  const train::GoldenView view = train::choose_golden_view(avatar);
+  options.peak_memory_bytes = verify::measure_memory(opened, avatar.body_file().package, view.pose.view(), view.camera);
+  const std::vector<std::byte> bytes = train::pack_avatar(avatar, folder, options);
+  throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
+  std::printf("%s: %zu bytes, %.0f kB of memory on the device\n", arguments.output.c_str(), bytes.size(),
+              static_cast<double>(options.peak_memory_bytes) / 1e3);
+}
+
+}  // namespace
+
+void add_pack_command(CLI::App& app) {
+  auto arguments = std::make_shared<PackArguments>();
+  arguments->open.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  CLI::App* command = app.add_subcommand("pack", "Write a run's avatar as a package");
+  command->add_option("RUN", arguments->open.run, "Folder of a run")->required();
+  command->add_option("-o,--output", arguments->output, "Package to write")->required();
+  command->add_option("--data", arguments->open.data, "Where the data is now (default: where the run found it)");
+  command->add_option("--body", arguments->open.body, "Where the body is now (default: where the run found it)");
+  command->add_option("--precision", arguments->precision, "f32")->check(CLI::IsMember({"f32", "q8"}));
+  command->add_flag("--golden,!--no-golden", arguments->pack.golden, "Carry an expected picture (default)");
+  command->add_option("--name", arguments->pack.name, "Name of the avatar (default: the identity's folder)");
+  command->add_option("--licence", arguments->pack.licence_name, "Licence (synthetic persons: CC0-1.0)");
+  command->add_option("--licence-url", arguments->pack.licence_url, "Where its text is");
+  command->add_option("--author", arguments->pack.authors, "Who made it; may be given several times");
+  command->add_option("--permission", arguments->pack.avatar_permission, "Who may perform with it")
+      ->check(CLI::IsMember({"onlyAuthor", "onlySeparatelyLicensedPerson", "everyone"}));
+  command->add_option("--commercial", arguments->pack.commercial_usage, "Commercial use")
+      ->check(CLI::IsMember({"personalNonProfit", "personalProfit", "corporation"}));
+  command->add_option("--depicted-person", arguments->pack.depicted_person, "\"synthetic\", or how consent was given");
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace figurine::cli

@@ -1,0 +1,24 @@
+// Pictures of a trained avatar and of its person, and the boxes in them that metrics and contact sheets look at.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "toolchain/evaluate/metrics.h"
+#include "toolchain/train/trained_avatar.h"
+
+namespace figurine::evaluate {
+
+Picture render_picture(train::TrainedAvatar& avatar, const train::TrainedAvatar::PosedFrame& posed, const Camera& camera);
+Picture true_picture(const dataset::Dataset& data, size_t frame, size_t camera);
+
+// The bounding box of the texels that `joints` move most, in the image; enlarged by a share of its sides. Empty if they are behind the
+// camera or outside.
+Box projected_box(const train::AvatarModel& model, const train::PosedBody& posed, const Camera& camera, std::span<const uint8_t> joints,
+                  float enlarge);
+
+// Joints of SMPL-X.
+std::span<const uint8_t> head_joints();
+std::span<const uint8_t> left_hand_joints();
+
+}  // namespace figurine::evaluate

@@ -1,0 +1,190 @@
+#include "toolchain/train/pack_avatar.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "formats/writer/package_writer.h"
+#include "ports/linux/png.h"
+#include "toolchain/error.h"
+
+namespace figurine::train {
+
+namespace {
+
+constexpr uint32_t kBodyJoints = 21;         // SMPL-X joints 1..21: body without root, hands and face
+constexpr double kPoseDeviation_rad = 0.03;  // added to every feature's spread
+constexpr uint32_t kGoldenSize_px = 256;
+constexpr std::array<float, 3> kGoldenBackground{0.5f, 0.5f, 0.5f};
+
+std::vector<std::byte> golden_png(TrainedAvatar& avatar, const GoldenView& view) {
+  const PosedBody posed = avatar.model().pose(view.pose.view());
+  const std::vector<float> rgba = avatar.model().render_rgba(avatar.model().evaluate(posed), posed, view.camera);
+  ports::ImageU8 image(view.camera.width_px, view.camera.height_px, 3);
+  for (size_t pixel = 0; pixel < rgba.size() / 4; ++pixel) {
+    for (size_t c = 0; c < 3; ++c) {
+      const float value = rgba[4 * pixel + c] + (1 - rgba[4 * pixel + 3]) * kGoldenBackground[c];
+      image.pixels[3 * pixel + c] = static_cast<uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255.0f + 0.5f);
+    }
+  }
+  return value_or_throw(ports::encode_png(image), "golden frame");
+}
+
+// A JSON object as dotted keys and values: {"budget": {"seconds": 60}} -> budget.seconds = 60.
+void flatten(const nlohmann::json& json, const std::string& prefix, std::vector<KeyValue>& out) {
+  for (const auto& [key, value] : json.items()) {
+    const std::string name = prefix.empty() ? key : prefix + "." + key;
+    if (value.is_object()) {
+      flatten(value, name, out);
+    } else {
+      out.push_back({name, value.is_string() ? value.get<std::string>() : value.dump()});
+    }
+  }
+}
+
+std::string text_of(const nlohmann::json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_string() ? found->get<std::string>() : std::string{};
+}
+
+// The figures of evaluation.json that a person asks a package for.
+std::vector<QualityMetric> read_quality(const RunDirectory& run) {
+  std::vector<QualityMetric> quality;
+  if (!std::filesystem::exists(run.evaluation())) return quality;
+  const nlohmann::json report = read_json(run.evaluation());
+  const auto add = [&](const char* name, const char* group, const char* metric) {
+    const auto found = report.find(group);
+    if (found == report.end() || !found->is_object()) return;
+    const auto value = found->find(metric);
+    if (value != found->end() && value->is_number()) quality.push_back({name, value->get<double>()});
+  };
+  add("psnr_view_db", "held_out_views", "psnr_db");
+  add("psnr_pose_db", "held_out_poses", "psnr_db");
+  add("flat_psnr_db", "held_out_poses", "flat_psnr_db");
+  add("head_psnr_db", "held_out_poses", "head_psnr_db");
+  add("highpass_ratio", "held_out_poses", "highpass_ratio");
+  return quality;
+}
+
+Provenance make_provenance(const TrainedAvatar& avatar, const RunDirectory& run, const PackOptions& options) {
+  const nlohmann::json& json = avatar.description().json;
+  const bool synthetic = !avatar.data().sources().empty();  // only figurine's own captures state their sources
+  if (!synthetic && (options.licence_name.empty() || options.depicted_person.empty())) {
+    throw InputError(run.path + ": shows a real person: say --licence and --depicted-person (how consent was given)");
+  }
+  const auto or_default = [](const std::string& given, const char* fallback) { return given.empty() ? std::string(fallback) : given; };
+  Provenance provenance{.tool = "figurine-train " FIGURINE_VERSION, .created = utc_now().substr(0, 10)};
+  provenance.sources = avatar.data().sources();
+  provenance.licence_name = or_default(options.licence_name, "CC0-1.0");
+  provenance.licence_url = options.licence_name.empty() ? "https://creativecommons.org/publicdomain/zero/1.0/" : options.licence_url;
+  provenance.authors = options.authors;
+  provenance.avatar_permission = or_default(options.avatar_permission, synthetic ? "everyone" : "onlyAuthor");
+  provenance.commercial_usage = or_default(options.commercial_usage, synthetic ? "corporation" : "personalNonProfit");
+  provenance.depicted_person = or_default(options.depicted_person, "synthetic");
+  for (const char* key : {"command", "commit"}) provenance.settings.push_back({key, text_of(json, key)});
+  flatten(to_json(avatar.description().settings), "", provenance.settings);
+  for (const char* key : {"iterations", "train_seconds"}) {
+    if (json.contains(key)) provenance.settings.push_back({key, json.at(key).dump()});
+  }
+  if (json.contains("data") && json.at("data").contains("seed"))
+    provenance.settings.push_back({"data.seed", json.at("data").at("seed").dump()});
+  provenance.quality = read_quality(run);
+  return provenance;
+}
+
+}  // namespace
+
+std::array<double, 3> rotation_vector(const float* wxyz) {
+  double q[4], length = 0;
+  for (int k = 0; k < 4; ++k) {
+    q[k] = wxyz[k];
+    length += q[k] * q[k];
+  }
+  length = std::sqrt(length);
+  const double sign = q[0] < 0 ? -1 : 1;  // q and -q are one rotation; this one turns by at most pi
+  for (double& value : q) value *= sign / length;
+  const double sine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  const double factor = sine < 1e-9 ? 2.0 : 2 * std::atan2(sine, q[0]) / sine;
+  return {factor * q[1], factor * q[2], factor * q[3]};
+}
+
+PoseFeatures pose_features(const std::vector<std::vector<float>>& rotations, uint32_t joint_count) {
+  PoseFeatures features;
+  const uint32_t joints = std::min(kBodyJoints, joint_count - 1);
+  for (uint32_t j = 1; j <= joints; ++j) features.joints.push_back(static_cast<uint8_t>(j));
+  const size_t size = 3 * size_t(joints);
+  std::vector<double> mean(size, 0), covariance(size * size, 0);
+  std::vector<std::vector<double>> rows;
+  for (const std::vector<float>& pose : rotations) {
+    std::vector<double>& row = rows.emplace_back();
+    for (uint8_t joint : features.joints) {
+      for (double value : rotation_vector(&pose[4 * size_t(joint)])) row.push_back(value);
+    }
+    for (size_t i = 0; i < size; ++i) mean[i] += row[i] / static_cast<double>(rotations.size());
+  }
+  for (const std::vector<double>& row : rows) {
+    for (size_t i = 0; i < size; ++i) {
+      for (size_t k = 0; k < size; ++k)
+        covariance[i * size + k] += (row[i] - mean[i]) * (row[k] - mean[k]) / static_cast<double>(rows.size());
+    }
+  }
+  for (size_t i = 0; i < size; ++i) covariance[i * size + i] += kPoseDeviation_rad * kPoseDeviation_rad;
+  features.mean.assign(mean.begin(), mean.end());
+  features.covariance.assign(covariance.begin(), covariance.end());
+  return features;
+}
+
+GoldenView choose_golden_view(const TrainedAvatar& avatar) {
+  const dataset::Dataset& data = avatar.data();
+  std::vector<size_t> block;
+  for (size_t frame = 0; frame < data.frames().size(); ++frame) {
+    if (data.frames()[frame].split == dataset::FrameSplit::kBlock) block.push_back(frame);
+  }
+  const size_t frame = block.empty() ? data.frames().size() / 2 : block[block.size() / 2];
+  GoldenView view{avatar.model().from_capture(data.frames()[frame]), data.cameras().front().camera};
+  Camera& camera = view.camera;
+  const float shrink = std::min(1.0f, float(kGoldenSize_px) / float(std::max(camera.width_px, camera.height_px)));
+  camera.width_px = std::max(1u, static_cast<uint32_t>(float(camera.width_px) * shrink));
+  camera.height_px = std::max(1u, static_cast<uint32_t>(float(camera.height_px) * shrink));
+  for (float* value : {&camera.fx_px, &camera.fy_px, &camera.cx_px, &camera.cy_px}) *value *= shrink;
+  return view;
+}
+
+std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& run, const PackOptions& options) {
+  const TrainSettings& settings = avatar.description().settings;
+  if (settings.freeze_pose) throw InputError(run.path + ": was trained with a frozen body pose, an experiment that no device can repeat");
+  std::vector<float> storage;
+  const Network network = avatar.model().unet().export_network(storage);
+  const std::vector<ValueShape> shapes = value_or_throw(infer_shapes(network, true), run.path);
+
+  std::vector<std::vector<float>> rotations;
+  for (const dataset::CaptureFrame& frame : avatar.data().frames()) {
+    if (frame.split == dataset::FrameSplit::kTrain) rotations.push_back(frame.rotations);
+  }
+  const PoseFeatures features = pose_features(rotations, avatar.body().joint_count());
+  const GoldenView view = choose_golden_view(avatar);
+  const std::vector<std::byte> png = options.golden ? golden_png(avatar, view) : std::vector<std::byte>{};
+
+  Avatar content{.name = options.name.empty() ? std::filesystem::path(avatar.data().directory()).filename().string() : options.name,
+                 .body_name = avatar.body().name,
+                 .body_hash = avatar.body_file().package.content_hash(),
+                 .preset = settings.preset,
+                 .template_mode = settings.template_mode,
+                 .shape = avatar.model().shape(),
+                 .map_statistics = {},
+                 .fourier_octaves = settings.fourier_octaves,
+                 .decoding = settings.decoding,
+                 .network = network,
+                 .pose_statistics = {features.joints, features.mean, features.covariance},
+                 .golden = {.root_translation_m = view.pose.root_translation_m,
+                            .rotations = view.pose.rotations,
+                            .camera = view.camera,
+                            .background = kGoldenBackground,
+                            .png = {reinterpret_cast<const uint8_t*>(png.data()), png.size()}}};
+  const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
+                                .macs_per_frame = count_macs(network, shapes),
+                                .gaussians = avatar.body().texel_count()};
+  return value_or_throw(write_package(content, budget, make_provenance(avatar, run, options)), run.path);
+}
+
+}  // namespace figurine::train

@@ -1,0 +1,46 @@
+// A run as an avatar package: network, decoding, shape, how unusual a pose is, where it all came from, and a golden frame to test a device
+// against.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "figurine/package.h"
+#include "toolchain/train/trained_avatar.h"
+
+namespace figurine::train {
+
+struct PackOptions {
+  std::string name;  // empty: the data folder's name
+  bool golden = true;
+  uint64_t peak_memory_bytes = 0;  // what the runtime needs for one instance; 0: not known yet
+  // Licence and consent. Empty fields are filled in for captures of figurine's own (synthetic persons): CC0-1.0, everyone, corporation,
+  // "synthetic". For anybody else licence_name and depicted_person have to be given.
+  std::string licence_name, licence_url;
+  std::string avatar_permission, commercial_usage, depicted_person;
+  std::vector<std::string> authors;
+};
+
+// The pose and the camera of the golden frame: the middle of the held-out block (of the training poses if nothing is held out), seen by the
+// first camera at 256 pixels or less a side.
+struct GoldenView {
+  OwnedPose pose;
+  Camera camera;
+};
+GoldenView choose_golden_view(const TrainedAvatar& avatar);
+
+// Features of PoseStatistics: rotation vectors of the 21 SMPL-X body joints, fewer for a smaller skeleton. covariance: [3P,3P], plus (0.03
+// rad)^2 on the diagonal, so that a joint that never moved in training still has a scale. poses: [F] of J rotations each.
+struct PoseFeatures {
+  std::vector<uint8_t> joints;
+  std::vector<float> mean, covariance;
+};
+PoseFeatures pose_features(const std::vector<std::vector<float>>& rotations, uint32_t joint_count);
+
+// The rotation vector (axis times angle, at most pi long) of a quaternion of any length, wxyz.
+std::array<double, 3> rotation_vector(const float* wxyz);
+
+// The package's bytes. Throws InputError: a run with frozen pose (a device always poses), missing consent, no weights.
+std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& run, const PackOptions& options);
+
+}  // namespace figurine::train

@@ -1,0 +1,41 @@
+#include "toolchain/train/trained_avatar.h"
+
+#include <ATen/Parallel.h>
+
+#include <filesystem>
+
+#include "toolchain/error.h"
+
+namespace figurine::train {
+
+TrainedAvatar TrainedAvatar::open(const OpenRunOptions& options) {
+  TrainedAvatar avatar;
+  const RunDirectory run{options.run};
+  avatar.description_ = read_run(run);
+  RunDescription& description = avatar.description_;
+  if (!options.data.empty()) description.data = options.data;
+  if (!options.body.empty()) description.body = options.body;
+  avatar.body_ = std::make_unique<PackageFile>(open_package(description.body, PackageKind::kBody));
+  const std::string hash = format_hash(avatar.body_->package.content_hash());
+  if (hash != description.body_hash) {
+    throw InputError(description.body + ": is body " + hash + ", " + options.run + " was trained on " + description.body_hash);
+  }
+  avatar.data_ = std::make_unique<dataset::Dataset>(
+      dataset::Dataset::open(description.data, {.body = &avatar.body_->package.body(), .body_hash = hash}));
+  if (avatar.data_->shape() != description.shape) throw InputError(description.data + ": shape: is not the person of " + options.run);
+  TrainSettings settings = description.settings;
+  settings.threads = options.threads;
+  at::set_num_threads(static_cast<int>(options.threads));
+  avatar.model_ = std::make_unique<AvatarModel>(avatar.body_->package.body(), description.shape, settings, model::Precision::kFloat32);
+  if (!std::filesystem::exists(run.weights())) throw InputError(options.run + ": has no weights yet");
+  load_weights(run.weights(), avatar.model_->unet());
+  return avatar;
+}
+
+TrainedAvatar::PosedFrame TrainedAvatar::pose(size_t frame) {
+  PosedFrame result{model_->pose(model_->from_capture(data_->frames()[frame]).view()), {}};
+  result.head = model_->evaluate(result.posed);
+  return result;
+}
+
+}  // namespace figurine::train
