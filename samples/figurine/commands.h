@@ -1,0 +1,26 @@
+// One function per command of figurine: adds the subcommand and its options, and says how to run it.
+#pragma once
+
+#include <functional>
+
+#include "figurine/status.h"
+
+namespace CLI {
+class App;
+}
+
+namespace figurine::samples {
+
+struct Command {
+  CLI::App* app = nullptr;
+  std::function<Status()> run;
+};
+
+Command add_render_command(CLI::App& app);
+Command add_splat_command(CLI::App& app);
+Command add_export_command(CLI::App& app);
+Command add_bench_command(CLI::App& app);
+Command add_report_command(CLI::App& app);
+Command add_selftest_command(CLI::App& app);
+
+}  // namespace figurine::samples

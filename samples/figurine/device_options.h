@@ -1,0 +1,35 @@
+// The options that every device command has, and the summary that --json prints.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "figurine/renderer.h"
+#include "figurine/status.h"
+
+namespace CLI {
+class App;
+}
+
+namespace figurine::samples {
+
+struct DeviceOptions {
+  std::string precision = "f32";
+  std::string isa = "scalar";
+  uint32_t threads = 0;  // 0: as many as there are CPUs, 8 at most
+  bool json = false;
+
+  // json_flag: whether the command has the plain --json; bench has one of its own.
+  void add_to(CLI::App& app, bool json_flag = true);
+  // kUnsupported for what this build cannot do, never a silent replacement.
+  Result<RendererOptions> renderer_options() const;
+};
+
+// "command" and "version", the first fields of every --json output (docs/json.md).
+nlohmann::ordered_json json_header(const char* command);
+// CPU, usable CPUs, threads in use, precision and kernels.
+nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threads);
+void print_json(const nlohmann::ordered_json& json);
+
+}  // namespace figurine::samples

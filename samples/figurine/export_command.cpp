@@ -1,0 +1,68 @@
+// figurine export: an avatar in one pose as a .ply file of 3D Gaussians, for any standard viewer.
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "ports/linux/files.h"
+#include "samples/figurine/cast.h"
+#include "samples/figurine/commands.h"
+#include "samples/figurine/device_options.h"
+#include "samples/gaussians/ply.h"
+
+namespace figurine::samples {
+
+namespace {
+
+struct ExportOptions {
+  CastOptions cast;
+  uint32_t frame = 0;
+  std::string output;
+  DeviceOptions device;
+};
+
+Status run_export(const ExportOptions& options) {
+  const Result<RendererOptions> renderer_options = options.device.renderer_options();
+  if (!renderer_options.ok()) return renderer_options.status();
+  if (!options.output.ends_with(".ply")) return Status(StatusCode::kUnsupported, options.output + ": Gaussians are exported as .ply");
+  Result<Cast> cast = Cast::load(options.cast);
+  if (!cast.ok()) return cast.status();
+  const Result<std::vector<uint32_t>> frames = cast->frames({.first = options.frame, .end = options.frame + 1});
+  if (!frames.ok()) return frames.status();
+  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
+  if (!renderer.ok()) return renderer.status();
+  FIG_RETURN_IF_ERROR(cast->add_to(**renderer));
+  const FrameAvatar posed = cast->pose(options.frame)[0];
+  const Result<GaussianView> gaussians = (*renderer)->pose_avatar(posed.avatar, posed.pose);
+  if (!gaussians.ok()) return gaussians.status();
+  const std::vector<std::byte> bytes = write_gaussian_ply(*gaussians);
+  FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.output, bytes));
+  if (options.device.json) {
+    nlohmann::ordered_json json = json_header("export");
+    json["avatar"] = options.cast.avatars[0];
+    json["output"] = options.output;
+    json["frame"] = options.frame;
+    json["gaussians"] = gaussians->count;
+    json["sh_degree"] = gaussians->sh_degree;
+    json["size_bytes"] = bytes.size();
+    print_json(json);
+  }
+  return {};
+}
+
+}  // namespace
+
+Command add_export_command(CLI::App& app) {
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App* command = app.add_subcommand("export", "Writes an avatar in one pose as .ply Gaussians");
+  options->cast.avatars.resize(1);
+  command->add_option("avatar", options->cast.avatars[0], "avatar package (.fgn)")->required();
+  command->add_option("--body", options->cast.body,
+                      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose")->expected(1);
+  command->add_option("--frame", options->frame, "of the motion")->check(CLI::Range(0u, UINT32_MAX - 1))->capture_default_str();
+  command->add_option("-o,--output", options->output, "x.ply")->required();
+  options->device.add_to(*command);
+  return {command, [options] { return run_export(*options); }};
+}
+
+}  // namespace figurine::samples

@@ -1,0 +1,39 @@
+// What the frames of a run cost: times per stage, work counts, and their summaries.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "figurine/renderer.h"
+
+namespace figurine::samples {
+
+struct Summary {
+  double median = 0;
+  double p90 = 0;  // nearest rank
+};
+// Zeros without values.
+Summary summarise(std::vector<double> values);
+
+class FrameLog {
+ public:
+  void add(const FrameStatistics& statistics, uint64_t total_ns);
+  size_t frames() const { return total_ms_.size(); }
+  Summary total_ms() const { return summarise(total_ms_); }
+  Summary stage_ms(Stage stage) const;
+  double median_blends() const { return summarise(blends_).median; }
+  double median_macs() const { return summarise(macs_).median; }
+
+  // {"total": {"median": ms, "p90": ms}, "maps": {...}, ...}, in the order of the stages.
+  nlohmann::ordered_json stages_json() const;
+  // Medians of Gaussians, visible, pairs, blends and macs.
+  nlohmann::ordered_json work_json() const;
+
+ private:
+  std::vector<double> total_ms_;
+  std::vector<double> stage_ms_[kStageCount];
+  std::vector<double> gaussians_, visible_, pairs_, blends_, macs_;
+};
+
+}  // namespace figurine::samples

@@ -1,0 +1,44 @@
+// figurine: avatars and Gaussians on this device.
+//
+// Exit codes: 0 done, 1 bad input (one line naming file, field and reason; no output file), 2 usage, 3 a bug of figurine. An interrupt ends
+// the process the way the signal would have.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "samples/figurine/commands.h"
+#include "samples/figurine/progress.h"
+
+int main(int argc, char** argv) {
+  using namespace figurine;
+  CLI::App app{"figurine: renders pose-driven Gaussian avatars on a CPU"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "figurine " FIGURINE_VERSION);
+  try {
+    const samples::Command commands[] = {samples::add_render_command(app), samples::add_splat_command(app),
+                                         samples::add_export_command(app), samples::add_bench_command(app),
+                                         samples::add_report_command(app), samples::add_selftest_command(app)};
+    app.parse(argc, argv);
+    samples::catch_interrupts();
+    for (const samples::Command& command : commands) {
+      if (!command.app->parsed()) continue;
+      const Status status = command.run();
+      if (status.ok()) return 0;
+      std::fprintf(stderr, "figurine: %s\n", status.message().c_str());
+      if (status.code() == StatusCode::kInterrupted) samples::die_of_interrupt();
+      return 1;
+    }
+    return 2;
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "figurine: %s (figurine --help)\n", error.what());
+    return 2;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "figurine: out of memory\n");
+    return 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "figurine: internal error: %s\n", error.what());
+    return 3;
+  }
+}

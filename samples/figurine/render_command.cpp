@@ -1,0 +1,184 @@
+// figurine render: avatars, posed by a motion, into images or video.
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "samples/figurine/cast.h"
+#include "samples/figurine/commands.h"
+#include "samples/figurine/contact_sheet.h"
+#include "samples/figurine/device_options.h"
+#include "samples/figurine/frame_log.h"
+#include "samples/figurine/frame_sink.h"
+#include "samples/figurine/machine.h"
+#include "samples/figurine/progress.h"
+#include "samples/figurine/rig.h"
+
+namespace figurine::samples {
+
+namespace {
+
+struct RenderOptions {
+  CastOptions cast;
+  DeviceOptions device;
+  std::string frames, camera, size, background, follow = "smooth";
+  std::optional<float> near_m;
+  std::optional<double> frames_per_second;
+  std::string output, contact_sheet;
+  ContactSheet::Options sheet;
+};
+
+constexpr std::array<float, 3> kVideoBackground{0.86f, 0.88f, 0.90f};  // a light, slightly cool grey: dark and light clothes stand out
+
+// Everything that the command line said, checked and loaded.
+struct Job {
+  Cast cast;
+  std::vector<uint32_t> frames;
+  RigOptions rig;
+  std::optional<std::array<float, 3>> background;
+  double frames_per_second = 30;
+};
+
+Result<Job> prepare(const RenderOptions& options) {
+  if (options.output.empty() && options.contact_sheet.empty()) {
+    return Status(StatusCode::kInvalidArgument, "render: nothing to write; give -o or --contact-sheet");
+  }
+  if (options.output.starts_with("/dev/video")) {
+    return Status(StatusCode::kUnsupported, options.output + ": video devices are unsupported in this build");
+  }
+  Result<Background> background = parse_background(options.background.empty() ? "alpha" : options.background);
+  if (!background.ok()) return background.status();
+  if (options.background.empty() && is_video_name(options.output)) background->colour = kVideoBackground;
+
+  Result<Cast> cast = Cast::load(options.cast);
+  if (!cast.ok()) return cast.status();
+  // One image of a motion is its first frame, unless a frame is named; a sequence is all of it.
+  const bool one_image = options.output.find('%') == std::string::npos && !is_video_name(options.output) && options.contact_sheet.empty();
+  const Result<FrameRange> range = parse_frames(!options.frames.empty() ? options.frames : one_image ? "0" : ":");
+  if (!range.ok()) return range.status();
+  Result<std::vector<uint32_t>> frames = cast->frames(*range);
+  if (!frames.ok()) return frames.status();
+
+  RigOptions rig{.follow = options.follow == "smooth", .near_m = options.near_m};
+  if (!options.size.empty()) {
+    const Result<ImageSize> size = parse_size(options.size);
+    if (!size.ok()) return size.status();
+    rig.size = *size;
+  }
+  if (!options.camera.empty()) {
+    const Result<CameraSpec> camera = parse_camera_spec(options.camera);
+    if (!camera.ok()) return camera.status();
+    rig.camera = *camera;
+  }
+  const double rate = options.frames_per_second.value_or(cast->frames_per_second() / range->step);
+  return Job{std::move(*cast), std::move(*frames), std::move(rig), background->colour, rate};
+}
+
+Status run_render(const RenderOptions& options) {
+  const Result<RendererOptions> renderer_options = options.device.renderer_options();
+  if (!renderer_options.ok()) return renderer_options.status();
+  Result<Job> job = prepare(options);
+  if (!job.ok()) return job.status();
+
+  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
+  if (!renderer.ok()) return renderer.status();
+  FIG_RETURN_IF_ERROR(job->cast.add_to(**renderer));
+  const Result<std::vector<Camera>> cameras = place_cameras(job->rig, job->frames, job->cast, **renderer);
+  if (!cameras.ok()) return cameras.status();
+  const ImageSize size{cameras->front().width_px, cameras->front().height_px};
+  const auto frame_count = static_cast<uint32_t>(job->frames.size());
+  const bool opaque = job->background.has_value();
+
+  std::unique_ptr<FrameSink> sink;
+  if (!options.output.empty()) {
+    Result<std::unique_ptr<FrameSink>> created = FrameSink::create(
+        options.output, {.size = size, .frame_count = frame_count, .frames_per_second = job->frames_per_second, .opaque = opaque});
+    if (!created.ok()) return created.status();
+    sink = std::move(*created);
+  }
+  std::optional<ContactSheet> sheet;
+  if (!options.contact_sheet.empty()) {
+    ContactSheet::Options sheet_options = options.sheet;
+    sheet_options.frame_size = size;
+    sheet_options.frame_count = frame_count;
+    Result<ContactSheet> created = ContactSheet::create(sheet_options);
+    if (!created.ok()) return created.status();
+    sheet = std::move(*created);
+    if (sink && sink->format() != PixelFormat::kRgba8) {
+      return Status(StatusCode::kUnsupported, options.output + ": a contact sheet is made beside 8-bit images or video, not .pfm");
+    }
+  }
+
+  RenderedFrame frame(size, sink ? sink->format() : PixelFormat::kRgba8);
+  FrameLog log;
+  Progress progress("render", frame_count);
+  const uint64_t start_ns = now_ns();
+  for (uint32_t i = 0; i < frame_count; ++i) {
+    FIG_RETURN_IF_ERROR(check_interrupt());
+    const uint64_t frame_start_ns = now_ns();
+    FIG_RETURN_IF_ERROR((*renderer)->render(
+        {.camera = (*cameras)[i], .avatars = job->cast.pose(job->frames[i]), .background = job->background}, frame.target()));
+    log.add((*renderer)->statistics(), now_ns() - frame_start_ns);
+    if (sink) FIG_RETURN_IF_ERROR(sink->add(frame));
+    if (sheet) sheet->offer(i, frame.u8);
+    progress.update(i + 1);
+  }
+  if (sink) FIG_RETURN_IF_ERROR(sink->finish());
+  if (sheet) FIG_RETURN_IF_ERROR(sheet->write(options.contact_sheet, opaque));
+  const double wall_s = static_cast<double>(now_ns() - start_ns) * 1e-9;
+
+  if (options.device.json) {
+    nlohmann::ordered_json json = json_header("render");
+    json["avatars"] = options.cast.avatars;
+    json["output"] = options.output;
+    if (sheet) json["contact_sheet"] = options.contact_sheet;
+    json["frames"] = frame_count;
+    json["size"] = {size.width_px, size.height_px};
+    json["frames_per_second"] = 1000 / std::max(log.total_ms().median, 1e-6);  // of rendering, by the median frame
+    json["frames_per_second_with_output"] = frame_count / std::max(wall_s, 1e-9);
+    json["stages_ms"] = log.stages_json();
+    json["work"] = log.work_json();
+    json["renderer_memory_bytes"] = (*renderer)->memory_bytes();
+    json["peak_memory_bytes"] = peak_memory_bytes();
+    json["machine"] = json_machine(options.device, renderer_options->threads);
+    print_json(json);
+  }
+  return {};
+}
+
+}  // namespace
+
+Command add_render_command(CLI::App& app) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App* command = app.add_subcommand("render", "Renders avatars to images or video");
+  command->add_option("avatars", options->cast.avatars, "avatar packages (.fgn)")->required();
+  command->add_option("--body", options->cast.body,
+                      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--motion", options->cast.motions, "motion packages: one for all avatars, or one for each")->expected(1)->take_all();
+  command->add_option("--frames", options->frames, "N, A:B or A:B:STEP (B excluded); default: all, or frame 0 for one image");
+  command->add_option("--place", options->cast.places, "X,Z[,HEADING] in metres and degrees, once for each avatar")
+      ->expected(1)
+      ->take_all();
+  command->add_option("--spacing", options->cast.spacing_m, "metres between avatars side by side")
+      ->check(CLI::Range(-1000.0f, 1000.0f))
+      ->capture_default_str();
+  command->add_option("--camera", options->camera, "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
+  command->add_option("--follow", options->follow, "what an orbit's target does: smooth (goes along with the figures) or off (stays)")
+      ->check(CLI::IsMember({"smooth", "off"}))
+      ->capture_default_str();
+  command->add_option("--near", options->near_m, "metres; Gaussians nearer than this are culled; default 0.2")->check(CLI::PositiveNumber);
+  command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the camera's, or the avatar's golden frame's");
+  command->add_option("--background", options->background, "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha for images");
+  command->add_option("--fps", options->frames_per_second, "frames a second of the video; default: the motion's, divided by STEP")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--contact-sheet", options->contact_sheet, "also put evenly chosen frames into one PNG");
+  command->add_option("--columns", options->sheet.columns, "of the contact sheet")->check(CLI::Range(1u, 100u))->capture_default_str();
+  command->add_option("--tiles", options->sheet.tiles, "of the contact sheet")->check(CLI::Range(1u, 10000u))->capture_default_str();
+  command->add_option("--sheet-shrink", options->sheet.shrink, "tiles are 1/N of a frame")
+      ->check(CLI::Range(1u, 64u))
+      ->capture_default_str();
+  command->add_option("-o,--output", options->output, "x.png, x_%04d.png, x.pfm, x.y4m or x.mp4");
+  options->device.add_to(*command);
+  return {command, [options] { return run_render(*options); }};
+}
+
+}  // namespace figurine::samples

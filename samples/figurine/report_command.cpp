@@ -1,0 +1,295 @@
+// figurine report: every speed-up as a point of error over run time. One table of dials; each setting is rendered for the same frames in
+// turn and held against the reference setting's pictures.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "ports/linux/files.h"
+#include "ports/linux/png.h"
+#include "samples/figurine/cast.h"
+#include "samples/figurine/commands.h"
+#include "samples/figurine/device_options.h"
+#include "samples/figurine/frame_log.h"
+#include "samples/figurine/frame_sink.h"
+#include "samples/figurine/image_error.h"
+#include "samples/figurine/machine.h"
+#include "samples/figurine/progress.h"
+#include "samples/figurine/report_page.h"
+#include "samples/figurine/rig.h"
+
+namespace figurine::samples {
+
+namespace {
+
+// What a setting may turn. A new kind of speed-up adds a member here and a row to dials().
+struct Knobs {
+  SplatOptions splat;
+};
+
+struct Setting {
+  std::string label;
+  double value = 0;  // the dial's position, for orders of convergence
+  bool is_default = false;
+  Knobs knobs;
+};
+
+struct Dial {
+  std::string name, meaning;
+  double theoretical_order = 0;  // error ~ value^order
+  std::string theory;
+  std::vector<Setting> settings;  // from coarse to fine
+};
+
+constexpr float kReferenceCut = 1e-7f;
+constexpr const char* kReferenceMeaning =
+    "the same renderer with the alpha cut at 1e-7: every contribution that float arithmetic can tell from nothing is blended. The "
+    "transmittance stop at 1e-4 "
+    "and the dilation of 0.3 px^2 are part of the definition of the picture and the same everywhere.";
+
+Dial alpha_cut_dial() {
+  Dial dial{
+      .name = "alpha cut",
+      .meaning = "contributions to a pixel with an alpha below this are skipped; it decides how far around its centre a Gaussian is drawn",
+      .theoretical_order = 1,
+      .theory =
+          "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is missing from the picture falls in proportion to the "
+          "cut.",
+      .settings = {}};
+  for (const int inverse : {16, 32, 64, 128, 255, 512, 1024, 4096, 16384}) {
+    const double cut = 1.0 / inverse;
+    dial.settings.push_back({.label = "1/" + std::to_string(inverse),
+                             .value = cut,
+                             .is_default = static_cast<float>(cut) == kAlphaCut,
+                             .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)}}});
+  }
+  return dial;
+}
+
+std::vector<Dial> dials() { return {alpha_cut_dial()}; }
+
+struct ReportOptions {
+  CastOptions cast;
+  DeviceOptions device;
+  std::string size, output;
+  uint32_t frames = 16;
+};
+
+struct Measurement {
+  ErrorSum error;
+  FrameLog log;
+};
+
+// Draws frame number i of the run with any setting.
+class Studio {
+ public:
+  Studio(Cast& cast, Renderer& renderer, std::vector<uint32_t> frames, std::vector<Camera> cameras)
+      : cast_(cast), renderer_(renderer), frames_(std::move(frames)), cameras_(std::move(cameras)) {}
+
+  Status draw(uint32_t i, const Knobs& knobs, RenderedFrame& picture) {
+    const std::span<const FrameAvatar> posed = cast_.moves() ? cast_.pose(frames_[i % frames_.size()]) : cast_.sway(i);
+    return renderer_.render({.camera = cameras_[i % cameras_.size()], .avatars = posed, .splat = knobs.splat}, picture.target());
+  }
+  Status measure(uint32_t i, const Setting& setting, const RenderedFrame& truth, RenderedFrame& u8, RenderedFrame& f32,
+                 Measurement& result) {
+    FIG_RETURN_IF_ERROR(draw(i, setting.knobs, f32));
+    add_foreground_error(truth.f32, f32.f32, result.error);
+    const uint64_t start_ns = now_ns();  // timed by itself, into the 8-bit picture that a user sees
+    FIG_RETURN_IF_ERROR(draw(i, setting.knobs, u8));
+    result.log.add(renderer_.statistics(), now_ns() - start_ns);
+    return {};
+  }
+  ImageSize size() const { return {cameras_[0].width_px, cameras_[0].height_px}; }
+
+ private:
+  Cast& cast_;
+  Renderer& renderer_;
+  std::vector<uint32_t> frames_;
+  std::vector<Camera> cameras_;
+};
+
+struct Box {
+  uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+// Where the picture has something, with a little room.
+Box foreground_box(const ports::ImageF32& image) {
+  Box box{image.width_px, image.height_px, 0, 0};
+  for (uint32_t y = 0; y < image.height_px; ++y) {
+    for (uint32_t x = 0; x < image.width_px; ++x) {
+      if (!(image.at(x, y)[3] > 0.02f)) continue;
+      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
+    }
+  }
+  if (box.x1 <= box.x0) return {0, 0, image.width_px, image.height_px};
+  constexpr uint32_t kRoom = 8;
+  return {box.x0 - std::min(box.x0, kRoom), box.y0 - std::min(box.y0, kRoom), std::min(box.x1 + kRoom, image.width_px),
+          std::min(box.y1 + kRoom, image.height_px)};
+}
+
+// The box of grey + gain * (picture - truth) over grey; gain 0 shows the truth itself over grey.
+Result<std::vector<std::byte>> draw_difference(const ports::ImageF32& truth, const ports::ImageF32& picture, const Box& box, float gain) {
+  ports::ImageU8 image(box.x1 - box.x0, box.y1 - box.y0, 3);
+  for (uint32_t y = box.y0; y < box.y1; ++y) {
+    for (uint32_t x = box.x0; x < box.x1; ++x) {
+      const float* t = truth.at(x, y);
+      const float* p = picture.at(x, y);
+      for (int c = 0; c < 3; ++c) {
+        const float over_truth = (t[c] - 0.5f) * t[3], difference = (p[c] - 0.5f) * p[3] - over_truth;
+        const float value = 0.5f + (gain == 0 ? over_truth : gain * difference);
+        image.at(x - box.x0, y - box.y0)[c] = static_cast<uint8_t>(std::lround(std::clamp(value, 0.0f, 1.0f) * 255));
+      }
+    }
+  }
+  return ports::encode_png(image);
+}
+
+// The truth and the differences of a coarse setting, the default and a fine one, for one frame.
+Status draw_pictures(Studio& studio, uint32_t frame, const Dial& dial, std::vector<ReportPicture>& pictures) {
+  constexpr float kGain = 32;
+  RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32), picture(studio.size(), PixelFormat::kRgbaF32);
+  FIG_RETURN_IF_ERROR(studio.draw(frame, {.splat = {.alpha_cut = kReferenceCut}}, truth));
+  const Box box = foreground_box(truth.f32);
+  Result<std::vector<std::byte>> png = draw_difference(truth.f32, truth.f32, box, 0);
+  if (!png.ok()) return png.status();
+  pictures.push_back({"the reference", std::move(*png)});
+  for (size_t s = 0; s < dial.settings.size(); ++s) {
+    const Setting& setting = dial.settings[s];
+    if (!setting.is_default && s != 1 && s + 2 != dial.settings.size()) continue;
+    FIG_RETURN_IF_ERROR(studio.draw(frame, setting.knobs, picture));
+    png = draw_difference(truth.f32, picture.f32, box, kGain);
+    if (!png.ok()) return png.status();
+    pictures.push_back({dial.name + " " + setting.label + (setting.is_default ? " (default)" : "") + ": difference x 32", std::move(*png)});
+  }
+  return {};
+}
+
+nlohmann::ordered_json finite_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
+}
+
+nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement>& measurements) {
+  nlohmann::ordered_json json = {
+      {"name", dial.name}, {"meaning", dial.meaning}, {"theoretical_order", dial.theoretical_order}, {"theory", dial.theory}};
+  json["settings"] = nlohmann::ordered_json::array();
+  for (size_t s = 0; s < dial.settings.size(); ++s) {
+    const Measurement& m = measurements[s];
+    nlohmann::ordered_json row = {
+        {"label", dial.settings[s].label}, {"value", dial.settings[s].value}, {"default", dial.settings[s].is_default}};
+    row["psnr_db"] = finite_or_null(m.error.psnr_db());
+    row["rmse"] = m.error.rmse();
+    row["largest"] = m.error.largest;
+    // The slope of log error over log value from the coarser neighbour to this setting.
+    row["observed_order"] = nullptr;
+    if (s > 0 && m.error.squared > 0 && measurements[s - 1].error.squared > 0) {
+      row["observed_order"] =
+          std::log(measurements[s - 1].error.rmse() / m.error.rmse()) / std::log(dial.settings[s - 1].value / dial.settings[s].value);
+    }
+    row["stages_ms"] = m.log.stages_json();
+    row["work"] = m.log.work_json();
+    json["settings"].push_back(std::move(row));
+  }
+  return json;
+}
+
+// Both files or none: the second is written only if the first could be, and takes it along if it fails.
+Status write_report(const std::string& folder, const nlohmann::ordered_json& json, const std::string& html) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return Status(StatusCode::kIo, folder + ": cannot be made: " + error.message());
+  const std::string text = json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  FIG_RETURN_IF_ERROR(ports::write_file_atomically(folder + "/report.json", std::as_bytes(std::span(text))));
+  const Status status = ports::write_file_atomically(folder + "/report.html", std::as_bytes(std::span(html)));
+  if (!status.ok()) std::filesystem::remove(folder + "/report.json", error);
+  return status;
+}
+
+Status run_report(const ReportOptions& options) {
+  const Result<RendererOptions> renderer_options = options.device.renderer_options();
+  if (!renderer_options.ok()) return renderer_options.status();
+  RigOptions rig;
+  if (!options.size.empty()) {
+    const Result<ImageSize> size = parse_size(options.size);
+    if (!size.ok()) return size.status();
+    rig.size = *size;
+  }
+  Result<Cast> cast = Cast::load(options.cast);
+  if (!cast.ok()) return cast.status();
+  // Evenly over the whole motion.
+  const Result<std::vector<uint32_t>> all = cast->frames({});
+  if (!all.ok()) return all.status();
+  std::vector<uint32_t> frames;
+  for (uint32_t i = 0; i < std::min<size_t>(options.frames, all->size()); ++i) {
+    frames.push_back((*all)[size_t(i) * all->size() / std::min<size_t>(options.frames, all->size())]);
+  }
+  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
+  if (!renderer.ok()) return renderer.status();
+  FIG_RETURN_IF_ERROR(cast->add_to(**renderer));
+  Result<std::vector<Camera>> cameras = place_cameras(rig, frames, *cast, **renderer);
+  if (!cameras.ok()) return cameras.status();
+  Studio studio(*cast, **renderer, std::move(frames), std::move(*cameras));
+
+  const std::vector<Dial> table = dials();
+  std::vector<std::vector<Measurement>> measurements;
+  for (const Dial& dial : table) measurements.emplace_back(dial.settings.size());
+  RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32), f32(studio.size(), PixelFormat::kRgbaF32),
+      u8(studio.size(), PixelFormat::kRgba8);
+  Progress progress("report", options.frames);
+  for (uint32_t i = 0; i < options.frames; ++i) {
+    FIG_RETURN_IF_ERROR(studio.draw(i, {.splat = {.alpha_cut = kReferenceCut}}, truth));
+    for (size_t d = 0; d < table.size(); ++d) {
+      const size_t count = table[d].settings.size();
+      for (size_t turn = 0; turn < count; ++turn) {  // another setting begins each round: nobody is always first after the reference
+        FIG_RETURN_IF_ERROR(check_interrupt());
+        const size_t s = (i + turn) % count;
+        FIG_RETURN_IF_ERROR(studio.measure(i, table[d].settings[s], truth, u8, f32, measurements[d][s]));
+      }
+    }
+    progress.update(i + 1);
+  }
+
+  nlohmann::ordered_json json = json_header("report");
+  json["date"] = date_utc();
+  json["machine"] = json_machine(options.device, renderer_options->threads);
+  json["avatar"] = options.cast.avatars[0];
+  json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(options.cast.motions[0]);
+  json["frames"] = options.frames;
+  json["size"] = {studio.size().width_px, studio.size().height_px};
+  json["reference"] = {{"alpha_cut", kReferenceCut}, {"meaning", kReferenceMeaning}};
+  json["metric"] =
+      "PSNR over pixels whose alpha in the reference exceeds 0.5, on stored sRGB values in float over mid-grey, squared errors pooled over "
+      "all "
+      "frames; largest is the largest difference of one value there";
+  json["timing"] = "median over the frames, settings taking turns within each frame; every frame has a fresh pose and a run of the network";
+  json["dials"] = nlohmann::ordered_json::array();
+  for (size_t d = 0; d < table.size(); ++d) json["dials"].push_back(dial_json(table[d], measurements[d]));
+  std::vector<ReportPicture> pictures;
+  FIG_RETURN_IF_ERROR(draw_pictures(studio, options.frames / 2, table[0], pictures));
+  FIG_RETURN_IF_ERROR(write_report(options.output, json, report_html(json, pictures)));
+  if (options.device.json) print_json(json);
+  return {};
+}
+
+}  // namespace
+
+Command add_report_command(CLI::App& app) {
+  auto options = std::make_shared<ReportOptions>();
+  CLI::App* command = app.add_subcommand("report", "Plots error against run time: report.json and report.html");
+  options->cast.avatars.resize(1);
+  command->add_option("avatar", options->cast.avatars[0], "avatar package (.fgn)")->required();
+  command->add_option("--body", options->cast.body,
+                      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose, swaying")->expected(1);
+  command->add_option("--frames", options->frames, "measured frames, evenly over the motion")
+      ->check(CLI::Range(1u, 10000u))
+      ->capture_default_str();
+  command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the golden frame's");
+  command->add_option("-o,--output", options->output, "folder for report.json and report.html")->required();
+  options->device.add_to(*command);
+  return {command, [options] { return run_report(*options); }};
+}
+
+}  // namespace figurine::samples
