@@ -14,16 +14,16 @@ namespace {
 
 static_assert(kBufferPadding >= XNN_EXTRA_BYTES);
 
-Status error_of(xnn_status status, const std::string& what) {
+Status error_of(xnn_status status, const char* what) {
   switch (status) {
     case xnn_status_success:
       return {};
     case xnn_status_out_of_memory:
-      return Status(StatusCode::kOutOfMemory, "XNNPACK: " + what + ": no memory");
+      return Status(StatusCode::kOutOfMemory, std::string("XNNPACK: ") + what + ": no memory");
     case xnn_status_unsupported_hardware:
-      return Status(StatusCode::kUnsupported, "XNNPACK: " + what + ": unsupported hardware");
+      return Status(StatusCode::kUnsupported, std::string("XNNPACK: ") + what + ": unsupported hardware");
     default:
-      return Status(StatusCode::kUnsupported, "XNNPACK: " + what + ": status " + std::to_string(static_cast<int>(status)));
+      return Status(StatusCode::kUnsupported, std::string("XNNPACK: ") + what + ": status " + std::to_string(static_cast<int>(status)));
   }
 }
 

@@ -1,0 +1,136 @@
+// A frame allocates nothing after the first, XNNPACK and the thread pool included; and what the renderer says it holds is about what it
+// took.
+//
+// This program replaces malloc and its kin by counting ones over glibc's own; under a sanitizer, which does the same, the counts are not
+// available.
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+
+#include "runtime/splat_scene.h"
+#include "runtime/test_packages.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define FIG_COUNTS_ALLOCATIONS 0
+#else
+#define FIG_COUNTS_ALLOCATIONS 1
+#endif
+
+namespace {
+std::atomic<uint64_t> g_allocations{0};
+std::atomic<int64_t> g_held_bytes{0};
+}  // namespace
+
+#if FIG_COUNTS_ALLOCATIONS
+extern "C" {
+void* __libc_malloc(size_t);
+void* __libc_calloc(size_t, size_t);
+void* __libc_realloc(void*, size_t);
+void* __libc_memalign(size_t, size_t);
+void __libc_free(void*);
+
+static void* count(void* block) {
+  g_allocations.fetch_add(1, std::memory_order_relaxed);
+  if (block != nullptr) g_held_bytes.fetch_add(static_cast<int64_t>(malloc_usable_size(block)), std::memory_order_relaxed);
+  return block;
+}
+static void uncount(void* block) {
+  if (block != nullptr) g_held_bytes.fetch_sub(static_cast<int64_t>(malloc_usable_size(block)), std::memory_order_relaxed);
+}
+void* malloc(size_t size) { return count(__libc_malloc(size)); }
+void* calloc(size_t n, size_t size) { return count(__libc_calloc(n, size)); }
+void* realloc(void* block, size_t size) {
+  uncount(block);
+  return count(__libc_realloc(block, size));
+}
+void* memalign(size_t alignment, size_t size) { return count(__libc_memalign(alignment, size)); }
+void* aligned_alloc(size_t alignment, size_t size) { return count(__libc_memalign(alignment, size)); }
+int posix_memalign(void** block, size_t alignment, size_t size) {
+  *block = count(__libc_memalign(alignment, size));
+  return *block == nullptr ? ENOMEM : 0;
+}
+void free(void* block) {
+  uncount(block);
+  __libc_free(block);
+}
+}
+#endif
+
+namespace figurine {
+namespace {
+
+using namespace tests;
+
+TEST(Allocation, TheCounterSeesNewAndMalloc) {
+  if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
+  const uint64_t before = g_allocations;
+  void* volatile block = std::malloc(10);
+  std::free(block);
+  int* volatile number = new int(3);
+  delete number;
+  EXPECT_EQ(g_allocations - before, 2u);
+}
+
+TEST(Allocation, NoFrameAllocatesAfterTheFirst) {
+  if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
+  for (const uint32_t threads : {1u, 2u}) {
+    const SyntheticBody body = make_test_body({.uv_size = 32});
+    const SyntheticAvatar avatar = make_test_avatar(body), other = make_test_avatar(body, {.sh_degree = 2, .seed = 3});
+    const std::unique_ptr<Renderer> renderer = make_renderer(threads);
+    const Result<AvatarId> a = renderer->add_avatar(*avatar.package, *body.package),
+                           b = renderer->add_avatar(*other.package, *body.package);
+    ASSERT_TRUE(a.ok() && b.ok());
+    const Scene scene = make_random_scene(5000, 1, 4);
+    const GaussianView view = scene.view();
+    std::vector<SyntheticPose> poses;
+    std::vector<Camera> cameras;
+    for (uint32_t frame = 0; frame < 12; ++frame) {
+      poses.push_back(make_test_pose(body.body(), frame));
+      cameras.push_back(make_test_camera(200, 160, 30.0f * static_cast<float>(frame)));
+      // Closer and closer: the pairs of later frames outgrow those of the first.
+      cameras.back().fx_px *= 1 + 0.1f * static_cast<float>(frame);
+      cameras.back().fy_px *= 1 + 0.1f * static_cast<float>(frame);
+    }
+    std::vector<uint8_t> rgba(200 * 160 * 4);
+    uint64_t after_first = 0, first_pairs = 0, largest_pairs = 0;
+    for (uint32_t frame = 0; frame < 12; ++frame) {
+      const FrameAvatar seen[] = {{.avatar = *a, .pose = poses[frame].view()}, {.avatar = *b, .pose = poses[11 - frame].view()}};
+      ASSERT_TRUE(
+          renderer
+              ->render({.camera = cameras[frame], .avatars = seen, .gaussians = {&view, 1}}, {.pixels = rgba.data(), .stride_bytes = 800})
+              .ok());
+      if (frame == 0) after_first = g_allocations;
+      (frame == 0 ? first_pairs : largest_pairs) = std::max(largest_pairs, renderer->statistics().pairs);
+    }
+    EXPECT_EQ(g_allocations - after_first, 0u) << threads << " threads";
+    EXPECT_GT(largest_pairs, first_pairs);
+  }
+}
+
+TEST(Allocation, MemoryBytesIsWhatWasTaken) {
+  if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
+  const SyntheticBody body = make_test_body({.uv_size = 128});
+  const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 32, .fourier_octaves = 5});
+  const SyntheticPose pose = make_test_pose(body.body(), 1);
+  std::vector<uint8_t> rgba(512 * 512 * 4);
+  {
+    make_renderer();
+  }  // XNNPACK's own tables, once a process
+  const int64_t before = g_held_bytes;
+  const std::unique_ptr<Renderer> renderer = make_renderer();
+  const Result<AvatarId> id = renderer->add_avatar(*avatar.package, *body.package);
+  ASSERT_TRUE(id.ok());
+  const FrameAvatar seen[] = {{.avatar = *id, .pose = pose.view()}};
+  ASSERT_TRUE(
+      renderer->render({.camera = make_test_camera(512, 512), .avatars = seen}, {.pixels = rgba.data(), .stride_bytes = 2048}).ok());
+  const double held = static_cast<double>(g_held_bytes - before), said = static_cast<double>(renderer->memory_bytes());
+  std::printf("edge-sized renderer: says %.2f MB, holds %.2f MB\n", said * 1e-6, held * 1e-6);
+  EXPECT_NEAR(said / held, 1, 0.2);
+}
+
+}  // namespace
+}  // namespace figurine
