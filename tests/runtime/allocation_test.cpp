@@ -26,6 +26,7 @@ std::atomic<int64_t> g_held_bytes{0};
 }  // namespace
 
 #if FIG_COUNTS_ALLOCATIONS
+#pragma GCC visibility push(default)  // hidden ones would not take the place of malloc in XNNPACK
 extern "C" {
 void* __libc_malloc(size_t);
 void* __libc_calloc(size_t, size_t);
@@ -58,6 +59,7 @@ void free(void* block) {
   __libc_free(block);
 }
 }
+#pragma GCC visibility pop
 #endif
 
 namespace figurine {
