@@ -3,6 +3,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -59,6 +60,26 @@ void Seal::renew(std::span<std::byte> bytes) const {
   if (header.index_offset <= bytes.size() && header.index_bytes <= bytes.size() - header.index_offset) {
     header.index_checksum = xxh3_64(bytes.subspan(header.index_offset, header.index_bytes));
   }
+  put_header(bytes, header);
+}
+
+void renew_what_looks_like_a_package(std::span<std::byte> bytes) {
+  if (bytes.size() < kPackageHeaderBytes) return;
+  layout::Header header = get_header(bytes);
+  header.magic = layout::kMagic;
+  header.version = kPackageVersion;
+  header.required_features = 0;
+  header.file_bytes = bytes.size();
+  header.index_offset = kPackageHeaderBytes;
+  const size_t index_bytes = std::min<size_t>(header.index_bytes, bytes.size() - kPackageHeaderBytes);
+  header.index_bytes = static_cast<uint32_t>(index_bytes);
+  // Whatever could be an extent of the index is given the checksum of what it covers.
+  for (size_t at = kPackageHeaderBytes; at + 24 <= kPackageHeaderBytes + index_bytes; at += 8) {
+    const uint64_t offset = get_u64(bytes, at), size = get_u64(bytes, at + 8);
+    if (offset % kBlobAlignment != 0 || offset < kPackageHeaderBytes + index_bytes || offset > bytes.size()) continue;
+    if (size != 0 && size <= bytes.size() - offset) put_u64(bytes, at + 16, xxh3_64(bytes.subspan(offset, size)));
+  }
+  header.index_checksum = xxh3_64(bytes.subspan(kPackageHeaderBytes, index_bytes));
   put_header(bytes, header);
 }
 

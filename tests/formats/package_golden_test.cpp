@@ -1,0 +1,70 @@
+// The committed packages of format version 1: today's writer makes the same bytes, today's reader reads them. If one of these fails after a
+// change of writer or schema, files in the field are at stake: read docs/package.md ("Evolution") before touching the golden files.
+//
+// FIGURINE_UPDATE_GOLDEN=1 package_test --gtest_filter='PackageGolden.*' writes them anew.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+
+#include "formats/package_bytes.h"
+#include "formats/package_samples.h"
+
+namespace figurine {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+std::string golden_path(PackageKind kind) {
+  return std::string(FIGURINE_SOURCE_DIR "/tests/golden/packages/") + to_string(kind) + "_v1.fgn";
+}
+
+Bytes read_golden(PackageKind kind) {
+  std::ifstream file(golden_path(kind), std::ios::binary);
+  EXPECT_TRUE(file.good()) << golden_path(kind);
+  const std::vector<char> chars{std::istreambuf_iterator<char>(file), {}};
+  const auto* begin = reinterpret_cast<const std::byte*>(chars.data());
+  return {begin, begin + chars.size()};
+}
+
+Bytes write_sample(PackageKind kind) {
+  switch (kind) {
+    case PackageKind::kBody:
+      return *samples::BodySample().write();
+    case PackageKind::kAvatar:
+      return *samples::AvatarSample().write();
+    case PackageKind::kMotion:
+      return *samples::MotionSample().write();
+  }
+  return {};
+}
+
+TEST(PackageGolden, TodaysWriterMakesTheGoldenBytes) {
+  for (PackageKind kind : {PackageKind::kBody, PackageKind::kAvatar, PackageKind::kMotion}) {
+    const Bytes bytes = write_sample(kind);
+    if (std::getenv("FIGURINE_UPDATE_GOLDEN") != nullptr) {
+      std::ofstream(golden_path(kind), std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+    }
+    EXPECT_TRUE(bytes == read_golden(kind)) << golden_path(kind);
+  }
+}
+
+TEST(PackageGolden, TodaysReaderReadsTheGoldenBytes) {
+  // Content hashes by value: neither the files nor the hash may drift.
+  const std::pair<PackageKind, const char*> expected[] = {{PackageKind::kBody, "8b8f9367898ad7d574f353e6b0b69ae7"},
+                                                          {PackageKind::kAvatar, "df4f0fdc16bf4abc2a392347c9560484"},
+                                                          {PackageKind::kMotion, "4c9a33c1c2bc8e307e13fe60efd5964d"}};
+  for (const auto& [kind, hash] : expected) {
+    const samples::ExactBytes bytes(read_golden(kind));
+    const Result<Package> package = Package::open(bytes.bytes(), golden_path(kind));
+    ASSERT_TRUE(package.ok()) << package.status().message();
+    EXPECT_EQ(package->kind(), kind);
+    EXPECT_EQ(format_hash(package->content_hash()), hash);
+    std::string reason;
+    EXPECT_TRUE(samples::exercise(*package, reason)) << reason;
+  }
+}
+
+}  // namespace
+}  // namespace figurine
