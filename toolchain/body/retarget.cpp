@@ -17,7 +17,10 @@ using Quat = Eigen::Quaterniond;
 using Vec3 = Eigen::Vector3d;
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kContactQuantile = 0.05;  // the ground is where the lowest soles are in the lowest twentieth of the frames
+constexpr double kMaxToeBendRad = 35 * kDegree;  // the capture's toe markers swap now and then: toes do not bend further
+constexpr double kContactReachM = 0.05;          // soles nearer to the floor than this are in contact
+constexpr double kContactSmoothS = 0.10;         // standard deviation over time of the contact correction
+constexpr double kContactQuantile = 0.05;        // the ground is where the lowest soles are in the lowest twentieth of the frames
 
 // A captured motion in terms of the 55 joints, whatever file it comes from.
 struct Source {
@@ -144,14 +147,47 @@ std::vector<float> sole_heights(const figurine::Body& body, const MotionClip& cl
   return heights;
 }
 
+// First the whole clip: the floor is where the lowest soles are. Then, slowly, frame by frame: a sole within reach of the floor is put on
+// it, because the source's legs differ from the body's by centimetres (and from each other). Jumps and climbs are out of reach and stay as
+// they are.
 void ground(const figurine::Body& body, MotionClip& clip, RetargetReport& report) {
-  const std::vector<float> heights = sole_heights(body, clip);
+  std::vector<float> heights = sole_heights(body, clip);
   std::vector<float> sorted = heights;
   std::sort(sorted.begin(), sorted.end());
   const float floor = sorted[static_cast<size_t>(kContactQuantile * static_cast<double>(sorted.size() - 1))];
-  for (size_t i = 1; i < clip.root_translation_m.size(); i += 3) clip.root_translation_m[i] -= floor;
-  report.lowest_sole_m = sorted.front() - floor;
-  for (float height : heights) report.mean_contact_m += std::abs(height - floor) / static_cast<float>(heights.size());
+  for (float& height : heights) height -= floor;
+
+  const double sigma = kContactSmoothS * double{clip.frames_per_second};
+  const int radius = static_cast<int>(std::ceil(3 * sigma)), count = static_cast<int>(heights.size());
+  std::vector<double> lift(heights.size());
+  for (int f = 0; f < count; ++f) {
+    double sum = 0, total = 1e-3;  // the small constant fades the correction out where nothing touches the floor
+    for (int i = std::max(0, f - radius); i <= std::min(count - 1, f + radius); ++i) {
+      const double height = heights[static_cast<size_t>(i)];
+      if (std::abs(height) > kContactReachM) continue;
+      const double weight = std::exp(-0.5 * (i - f) * (i - f) / (sigma * sigma));
+      sum += weight * height;
+      total += weight;
+    }
+    lift[static_cast<size_t>(f)] = sum / total;
+  }
+  report.lowest_sole_m = 1e30f;
+  float contact = 0;
+  for (size_t f = 0; f < heights.size(); ++f) {
+    clip.root_translation_m[3 * f + 1] -= floor + static_cast<float>(lift[f]);
+    const float height = heights[f] - static_cast<float>(lift[f]);
+    report.lowest_sole_m = std::min(report.lowest_sole_m, height);
+    if (std::abs(heights[f]) > kContactReachM) continue;
+    report.mean_contact_m += std::abs(height);
+    ++contact;
+  }
+  if (contact > 0) report.mean_contact_m /= contact;
+}
+
+// The same rotation, by at most `limit`.
+Quat limited(const Quat& rotation, double limit_rad) {
+  const double angle = rotation.angularDistance(Quat::Identity());
+  return angle > limit_rad ? Quat::Identity().slerp(limit_rad / angle, rotation) : rotation;
 }
 
 // Time resampled: source frame as a real number, clamped to its ends.
@@ -239,6 +275,7 @@ MotionClip retarget(Source source, const figurine::Body& body, const RetargetOpt
             source.world_from_neutral[a * kJointCount + j].slerp(sampler.share(t), source.world_from_neutral[b * kJointCount + j]);
         world[j] = from_neutral * align[j];
         local = parent < 0 ? world[j] : world[static_cast<size_t>(parent)].conjugate() * world[j];
+        if (j == kLeftFoot || j == kRightFoot) local = limited(local, kMaxToeBendRad);
       } else {
         world[j] = parent < 0 ? local : world[static_cast<size_t>(parent)] * local;
       }

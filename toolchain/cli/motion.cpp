@@ -71,7 +71,8 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   const auto bytes = value_or_throw(write_package(clip.view(), provenance), options.output);
   throw_if_error(ports::write_file_atomically(options.output, bytes), "-o");
   std::printf(
-      "%s: %u frames at %g a second, soles %.1f mm from the ground on average (lowest %.1f), largest step of a joint %.1f degrees, %zu "
+      "%s: %u frames at %g a second, soles in contact %.1f mm from the ground on average (lowest %.1f), largest step of a joint %.1f "
+      "degrees, %zu "
       "bytes\n",
       options.output.c_str(), clip.frame_count, double{clip.frames_per_second}, 1e3 * double{report.mean_contact_m},
       1e3 * double{report.lowest_sole_m}, 57.29578 * double{report.largest_step_rad}, bytes.size());
