@@ -25,3 +25,11 @@ target_link_libraries(figurine_writer PUBLIC figurine_formats)
 target_include_directories(figurine_writer PUBLIC "${PROJECT_SOURCE_DIR}")
 target_include_directories(figurine_writer SYSTEM PRIVATE "${CMAKE_CURRENT_BINARY_DIR}/schema")
 target_compile_options(figurine_writer PRIVATE -fno-exceptions)
+
+# Needs figurine_ports_files (ports/linux), which is configured after this folder: targets are linked by name.
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+add_executable(figurine-inspect inspect/compare.cpp inspect/describe.cpp inspect/main.cpp inspect/print.cpp)
+target_compile_definitions(figurine-inspect PRIVATE FIGURINE_VERSION="${PROJECT_VERSION}")
+target_include_directories(figurine-inspect PRIVATE "${PROJECT_SOURCE_DIR}")
+target_link_libraries(figurine-inspect PRIVATE figurine_formats figurine_ports_files CLI11::CLI11 nlohmann_json::nlohmann_json)

@@ -1,0 +1,220 @@
+#include "formats/inspect/describe.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <format>
+#include <limits>
+
+#include "formats/inspect/tensor_values.h"
+
+namespace figurine::inspect {
+
+namespace {
+
+// The shortest decimal that is this float, as the double that prints so: 0.05, not 0.05000000074505806.
+double number(float value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof(text), value).ptr;
+  double shortest = value;
+  std::from_chars(text, end, shortest);
+  return shortest;
+}
+
+Json numbers(std::span<const float> values) {
+  Json list = Json::array();
+  for (float value : values) list.push_back(number(value));
+  return list;
+}
+
+// What every package of version 1 means; the reader refuses others.
+Json describe_conventions() {
+  return {{"length_unit", "metre"},
+          {"axes", "right-handed, y up; cameras OpenCV (x right, y down, z forward)"},
+          {"colour_space", "sRGB-encoded as stored, straight alpha"},
+          {"rotations", "unit quaternions wxyz, relative to the parent joint"},
+          {"rest_frames", "world-aligned: a joint's rest transform is a translation to its rest position"}};
+}
+
+Json describe_provenance(const Provenance& provenance) {
+  Json settings = Json::array(), quality = Json::object();
+  for (const KeyValue& setting : provenance.settings) settings.push_back({{"key", setting.key}, {"value", setting.value}});
+  for (const QualityMetric& metric : provenance.quality) quality[metric.name] = metric.value;
+  return {{"tool", provenance.tool},
+          {"created", provenance.created},
+          {"settings", settings},
+          {"sources", provenance.sources},
+          {"quality", quality},
+          {"authors", provenance.authors},
+          {"licence_name", provenance.licence_name},
+          {"licence_url", provenance.licence_url},
+          {"avatar_permission", provenance.avatar_permission},
+          {"commercial_usage", provenance.commercial_usage},
+          {"depicted_person", provenance.depicted_person}};
+}
+
+// Degrees of the left arm below the horizontal at rest: 0 is a T-pose, about 45 an A-pose. Null if the joints have other names.
+Json left_arm_below_horizontal(const Body& body) {
+  const auto joint = [&](const char* name) { return std::ranges::find(body.joint_names, name) - body.joint_names.begin(); };
+  const auto shoulder = joint("left_shoulder"), wrist = joint("left_wrist"), end = std::ssize(body.joint_names);
+  if (shoulder == end || wrist == end) return nullptr;
+  double arm[3];
+  for (int k = 0; k < 3; ++k) arm[k] = double(body.joint_position_m[wrist * 3 + k]) - body.joint_position_m[shoulder * 3 + k];
+  const double degrees = std::atan2(-arm[1], std::hypot(arm[0], arm[2])) * 180 / 3.14159265358979323846;
+  return std::round(degrees * 10) / 10;
+}
+
+Json describe_body(const Body& body) {
+  float low[3], high[3];
+  std::fill_n(low, 3, std::numeric_limits<float>::max());
+  std::fill_n(high, 3, std::numeric_limits<float>::lowest());
+  for (size_t i = 0; i < body.texel_position_m.size(); ++i) {
+    low[i % 3] = std::min(low[i % 3], body.texel_position_m[i]);
+    high[i % 3] = std::max(high[i % 3], body.texel_position_m[i]);
+  }
+  Json joints = Json::array();
+  for (uint32_t j = 0; j < body.joint_count(); ++j) {
+    joints.push_back({{"name", body.joint_names[j]},
+                      {"parent", body.parents[j]},
+                      {"rest_position_m", numbers(body.joint_position_m.subspan(j * 3, 3))}});
+  }
+  return {{"uv_size", body.uv_size},
+          {"covered_texels", body.texel_count()},
+          {"border_texels", body.border_texel.size()},
+          {"shape_coefficients", body.shape_count()},
+          {"rest_extent_m", {{"min", numbers(low)}, {"max", numbers(high)}}},
+          {"left_arm_below_horizontal_deg", left_arm_below_horizontal(body)},
+          {"joints", joints}};
+}
+
+Json describe_motion(const Motion& motion) {
+  return {{"frames", motion.frame_count},
+          {"frames_per_second", number(motion.frames_per_second)},
+          {"seconds", std::round(motion.frame_count / double(motion.frames_per_second) * 1000) / 1000},
+          {"joints", motion.joint_names}};
+}
+
+std::string layer_name(const Layer& layer) {
+  switch (layer.op) {
+    case LayerOp::kConv2d:
+      return std::format("conv {0}x{0}{1}", layer.kernel, layer.relu ? " relu" : "");
+    case LayerOp::kMaxPool2:
+      return "max pool 2x2";
+    case LayerOp::kUpsample2:
+      return "upsample x2";
+    case LayerOp::kConcat:
+      return "concat";
+  }
+  return "";
+}
+
+Json describe_network(const Network& network) {
+  const std::vector<ValueShape> shapes = infer_shapes(network, true).value();
+  Json layers = Json::array();
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    const Layer& layer = network.layers[i];
+    Json inputs = Json::array({layer.inputs[0]});
+    if (layer.op == LayerOp::kConcat) inputs.push_back(layer.inputs[1]);
+    layers.push_back({{"op", layer_name(layer)}, {"inputs", inputs}, {"size", shapes[i + 1].size}, {"channels", shapes[i + 1].channels}});
+  }
+  return {{"input", {{"size", network.input_size}, {"channels", network.input_channels}}},
+          {"parameters", count_parameters(network)},
+          {"macs", count_macs(network, shapes)},
+          {"layers", layers}};
+}
+
+Json describe_golden(const GoldenFrame& golden) {
+  if (golden.rotations.empty()) return nullptr;
+  return {{"joints", golden.rotations.size() / 4},
+          {"root_translation_m", numbers(golden.root_translation_m)},
+          {"width_px", golden.camera.width_px},
+          {"height_px", golden.camera.height_px},
+          {"focal_px", {number(golden.camera.fx_px), number(golden.camera.fy_px)}},
+          {"principal_point_px", {number(golden.camera.cx_px), number(golden.camera.cy_px)}},
+          {"near_m", number(golden.camera.near_m)},
+          {"view_from_world", numbers(golden.camera.view_from_world)},
+          {"background", numbers(golden.background)},
+          {"png_bytes", golden.png.size()}};
+}
+
+Json describe_avatar(const Avatar& avatar) {
+  const HeadDecoding& decoding = avatar.decoding;
+  return {{"body", {{"name", avatar.body_name}, {"hash", format_hash(avatar.body_hash)}}},
+          {"preset", avatar.preset},
+          {"template", avatar.template_mode == TemplateMode::kMean ? "mean" : "shaped"},
+          {"shape", numbers(avatar.shape)},
+          {"fourier_octaves", avatar.fourier_octaves},
+          {"map_mean", numbers(avatar.map_statistics.mean)},
+          {"map_scale", numbers(avatar.map_statistics.scale)},
+          {"decoding",
+           {{"offset_scale_m", number(decoding.offset_scale_m)},
+            {"spacing_scale", number(decoding.spacing_scale)},
+            {"max_log_scale", number(decoding.max_log_scale)},
+            {"opacity_bias", number(decoding.opacity_bias)},
+            {"sh_degree", decoding.sh_degree}}},
+          {"network", describe_network(avatar.network)},
+          {"pose_statistics_joints", avatar.pose_statistics.joints},
+          {"golden", describe_golden(avatar.golden)}};
+}
+
+}  // namespace
+
+Json describe(const Package& package, const std::string& path) {
+  const Budget& budget = package.budget();
+  Json document = {
+      {"file", path},
+      {"format", "fgn"},
+      {"version", package.version()},
+      {"kind", to_string(package.kind())},
+      {"name", ""},
+      {"content_hash", format_hash(package.content_hash())},
+      {"size_bytes", package.size_bytes()},
+      {"required_features", package.required_features()},
+      {"optional_features", package.optional_features()},
+      {"budget",
+       {{"peak_memory_bytes", budget.peak_memory_bytes}, {"macs_per_frame", budget.macs_per_frame}, {"gaussians", budget.gaussians}}},
+      {"conventions", describe_conventions()}};
+  switch (package.kind()) {
+    case PackageKind::kBody:
+      document["name"] = package.body().name;
+      document["body"] = describe_body(package.body());
+      break;
+    case PackageKind::kAvatar:
+      document["name"] = package.avatar().name;
+      document["avatar"] = describe_avatar(package.avatar());
+      break;
+    case PackageKind::kMotion:
+      document["name"] = package.motion().name;
+      document["motion"] = describe_motion(package.motion());
+      break;
+  }
+  document["provenance"] = describe_provenance(package.provenance());
+  return document;
+}
+
+Json describe_tensors(const Package& package, std::span<const std::byte> bytes) {
+  Json list = Json::array();
+  for (const TensorInfo& tensor : package.tensors()) {
+    const TensorValues values(tensor, bytes);
+    double low = values[0], high = values[0], sum = 0;
+    for (size_t i = 0; i < values.count(); ++i) {
+      low = std::min(low, values[i]);
+      high = std::max(high, values[i]);
+      sum += values[i];
+    }
+    const double mean = sum / static_cast<double>(values.count());
+    const bool is_float = tensor.type == DataType::kF32;
+    list.push_back({{"name", tensor.name},
+                    {"type", to_string(tensor.type)},
+                    {"shape", tensor.shape},
+                    {"offset_bytes", tensor.offset_bytes},
+                    {"size_bytes", tensor.size_bytes},
+                    {"min", is_float ? number(static_cast<float>(low)) : low},
+                    {"max", is_float ? number(static_cast<float>(high)) : high},
+                    {"mean", number(static_cast<float>(mean))},
+                    {"checksum", std::format("{:016x}", tensor.checksum)}});
+  }
+  return list;
+}
+
+}  // namespace figurine::inspect

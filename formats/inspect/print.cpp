@@ -1,0 +1,211 @@
+#include "formats/inspect/print.h"
+
+#include <format>
+#include <vector>
+
+namespace figurine::inspect {
+
+namespace {
+
+// Collects "label  value" lines under headings; a value of several lines is indented under its label.
+class Page {
+ public:
+  void heading(const std::string& text) { text_ += (text_.empty() ? "" : "\n") + text + "\n"; }
+  void line(const std::string& label, const std::string& value) {
+    if (value.empty()) return;
+    std::string indented;
+    for (char c : value) {
+      indented += c;
+      if (c == '\n') indented += std::string(kIndent, ' ');
+    }
+    text_ += std::format("  {:<{}}{}\n", label, kIndent - 2, indented);
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  static constexpr size_t kIndent = 20;
+  std::string text_;
+};
+
+std::string text_of(const Json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); }
+
+std::string in_bytes(const Json& value) {
+  const double bytes = value.get<double>();
+  if (bytes == 0) return "not declared";
+  if (bytes < 1e5) return std::format("{:.0f} bytes", bytes);
+  return bytes < 1e9 ? std::format("{:.2f} MB", bytes / 1e6) : std::format("{:.2f} GB", bytes / 1e9);
+}
+
+std::string in_millions(const Json& value) {
+  const double count = value.get<double>();
+  if (count == 0) return "not declared";
+  if (count < 1e5) return std::format("{:.0f}", count);
+  return count < 1e9 ? std::format("{:.2f} million", count / 1e6) : std::format("{:.3f} thousand million", count / 1e9);
+}
+
+std::string joined(const Json& list, const char* separator) {
+  std::string text;
+  for (const Json& entry : list) text += (text.empty() ? "" : separator) + text_of(entry);
+  return text;
+}
+
+// Names in lines of at most 100 characters.
+std::string wrapped(const std::vector<std::string>& words) {
+  std::string text;
+  size_t width = 0;
+  for (const std::string& word : words) {
+    if (width + word.size() + 2 > 100) {
+      text += "\n";
+      width = 0;
+    } else if (!text.empty()) {
+      text += "  ";
+    }
+    text += word;
+    width += word.size() + 2;
+  }
+  return text;
+}
+
+void print_body(Page& page, const Json& body) {
+  page.heading("body");
+  page.line("map", std::format("{0}x{0} texels, {1} covered, {2} border", text_of(body["uv_size"]), text_of(body["covered_texels"]),
+                               text_of(body["border_texels"])));
+  page.line("shape", text_of(body["shape_coefficients"]) + " coefficients");
+  const Json &low = body["rest_extent_m"]["min"], &high = body["rest_extent_m"]["max"];
+  std::string rest =
+      std::format("x {:.3f} to {:.3f} m, y {:.3f} to {:.3f} m, z {:.3f} to {:.3f} m", low[0].get<double>(), high[0].get<double>(),
+                  low[1].get<double>(), high[1].get<double>(), low[2].get<double>(), high[2].get<double>());
+  if (const Json& arm = body["left_arm_below_horizontal_deg"]; !arm.is_null())
+    rest += "\nleft arm " + text_of(arm) + " degrees below the horizontal";
+  page.line("rest pose", rest);
+  std::vector<std::string> names;
+  for (const Json& joint : body["joints"]) names.push_back(std::format("{} {}", names.size(), text_of(joint["name"])));
+  page.line("joint order", wrapped(names));
+}
+
+void print_motion(Page& page, const Json& motion) {
+  page.heading("motion");
+  page.line("frames", std::format("{} at {} a second, {} s", text_of(motion["frames"]), text_of(motion["frames_per_second"]),
+                                  text_of(motion["seconds"])));
+  std::vector<std::string> names;
+  for (const Json& joint : motion["joints"]) names.push_back(std::format("{} {}", names.size(), text_of(joint)));
+  page.line("joint order", wrapped(names));
+}
+
+void print_avatar(Page& page, const Json& avatar) {
+  page.heading("avatar");
+  page.line("body", text_of(avatar["body"]["name"]) + "  " + text_of(avatar["body"]["hash"]));
+  page.line("joint order", "the body's");
+  page.line("preset", text_of(avatar["preset"]));
+  page.line("template", text_of(avatar["template"]) + ", " + std::to_string(avatar["shape"].size()) + " shape coefficients");
+  const Json& network = avatar["network"];
+  page.line("network", std::format("input {0}x{0}x{1}, {2} layers, {3} parameters, {4} MACs", text_of(network["input"]["size"]),
+                                   text_of(network["input"]["channels"]), network["layers"].size(), text_of(network["parameters"]),
+                                   in_millions(network["macs"])));
+  page.line("Fourier octaves", text_of(avatar["fourier_octaves"]));
+  const Json& decoding = avatar["decoding"];
+  page.line("decoding", std::format("offset x {} m, scale x {} texel spacings, log-scale at most {}, opacity bias {}, SH degree {}",
+                                    text_of(decoding["offset_scale_m"]), text_of(decoding["spacing_scale"]),
+                                    text_of(decoding["max_log_scale"]), text_of(decoding["opacity_bias"]), text_of(decoding["sh_degree"])));
+  page.line("pose statistics",
+            avatar["pose_statistics_joints"].empty() ? "none" : std::to_string(avatar["pose_statistics_joints"].size()) + " joints");
+  const Json& golden = avatar["golden"];
+  page.line("golden frame", golden.is_null()
+                                ? "none"
+                                : std::format("{}x{} pixels, {} joints, image of {} bytes", text_of(golden["width_px"]),
+                                              text_of(golden["height_px"]), text_of(golden["joints"]), text_of(golden["png_bytes"])));
+}
+
+void print_provenance(Page& page, const Json& provenance) {
+  page.heading("provenance");
+  page.line("tool", text_of(provenance["tool"]));
+  page.line("created", text_of(provenance["created"]));
+  page.line("sources", joined(provenance["sources"], "\n"));
+  std::string settings;
+  for (const Json& setting : provenance["settings"]) {
+    settings += (settings.empty() ? "" : "\n") + text_of(setting["key"]) + " = " + text_of(setting["value"]);
+  }
+  page.line("settings", settings);
+  std::string quality;
+  for (const auto& [name, value] : provenance["quality"].items()) quality += (quality.empty() ? "" : "\n") + name + " = " + value.dump();
+  page.line("quality", quality);
+  page.line("authors", joined(provenance["authors"], ", "));
+  page.heading("licence");
+  page.line("name", text_of(provenance["licence_name"]));
+  page.line("url", text_of(provenance["licence_url"]));
+  page.line("who may perform", text_of(provenance["avatar_permission"]));
+  page.line("commercial usage", text_of(provenance["commercial_usage"]));
+  page.line("depicted person", text_of(provenance["depicted_person"]));
+}
+
+}  // namespace
+
+std::string print_package(const Json& document) {
+  Page page;
+  page.heading(text_of(document["file"]));
+  page.line("kind", std::format("{}, format version {}", text_of(document["kind"]), text_of(document["version"])));
+  page.line("name", text_of(document["name"]));
+  page.line("content hash", text_of(document["content_hash"]));
+  page.line("size", in_bytes(document["size_bytes"]));
+  page.line("features", std::format("required {:#x}, optional {:#x}", document["required_features"].get<uint64_t>(),
+                                    document["optional_features"].get<uint64_t>()));
+
+  page.heading("what it needs");
+  const Json& budget = document["budget"];
+  if (document["kind"] == "avatar") {
+    page.line("peak memory", in_bytes(budget["peak_memory_bytes"]));
+    page.line("MACs a frame", in_millions(budget["macs_per_frame"]));
+  }
+  if (document["kind"] != "motion") page.line("Gaussians", budget["gaussians"] == 0 ? "not declared" : text_of(budget["gaussians"]));
+  for (const auto& [name, value] : document["conventions"].items()) {
+    std::string label = name;
+    for (char& c : label) c = c == '_' ? ' ' : c;
+    page.line(label, text_of(value));
+  }
+  if (document.contains("body")) print_body(page, document["body"]);
+  if (document.contains("avatar")) print_avatar(page, document["avatar"]);
+  if (document.contains("motion")) print_motion(page, document["motion"]);
+  print_provenance(page, document["provenance"]);
+  return page.text();
+}
+
+std::string print_tensors(const Json& tensors) {
+  const auto row = [](const auto& name, const auto& type, const auto& shape, const auto& bytes, const auto& low, const auto& high,
+                      const auto& mean, const auto& checksum) {
+    return std::format("{:<26}{:<5}{:<18}{:>11}{:>13}{:>13}{:>13}  {}\n", name, type, shape, bytes, low, high, mean, checksum);
+  };
+  const auto six = [](const Json& value) { return std::format("{:.6g}", value.get<double>()); };
+  std::string text = row("tensor", "type", "shape", "bytes", "min", "max", "mean", "XXH3-64");
+  for (const Json& tensor : tensors) {
+    text += row(text_of(tensor["name"]), text_of(tensor["type"]), "[" + joined(tensor["shape"], ",") + "]", text_of(tensor["size_bytes"]),
+                six(tensor["min"]), six(tensor["max"]), six(tensor["mean"]), text_of(tensor["checksum"]));
+  }
+  return text;
+}
+
+std::string print_comparison(const Json& comparison) {
+  std::string text;
+  for (const char* side : {"a", "b"}) {
+    text += std::format("{}: {}  {}\n", side, text_of(comparison[side]["file"]), text_of(comparison[side]["content_hash"]));
+  }
+  for (const Json& field : comparison["fields"]) {
+    text += std::format("  {}: {} -> {}\n", text_of(field["field"]), field["a"].dump(), field["b"].dump());
+  }
+  for (const Json& tensor : comparison["tensors"]) {
+    const std::string name = text_of(tensor["name"]), difference = text_of(tensor["difference"]);
+    if (difference == "values") {
+      text +=
+          std::format("  {}: {} of {} values differ, largest difference {:.6g}, rms {:.6g}\n", name, text_of(tensor["different_values"]),
+                      text_of(tensor["values"]), tensor["max_abs_difference"].get<double>(), tensor["rms_difference"].get<double>());
+    } else if (difference == "shape or type") {
+      text += std::format("  {}: {} [{}] -> {} [{}]\n", name, text_of(tensor["a"]["type"]), joined(tensor["a"]["shape"], ","),
+                          text_of(tensor["b"]["type"]), joined(tensor["b"]["shape"], ","));
+    } else {
+      text += std::format("  {}: {}\n", name, difference);
+    }
+  }
+  if (comparison["same"].get<bool>()) return text + "the same content\n";
+  return text + std::format("{} fields and {} tensors differ\n", comparison["fields"].size(), comparison["tensors"].size());
+}
+
+}  // namespace figurine::inspect

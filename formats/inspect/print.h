@@ -1,0 +1,14 @@
+// The inspector's documents as text for people. What a program should read is --json.
+#pragma once
+
+#include <string>
+
+#include "formats/inspect/describe.h"
+
+namespace figurine::inspect {
+
+std::string print_package(const Json& document);
+std::string print_tensors(const Json& tensors);
+std::string print_comparison(const Json& comparison);
+
+}  // namespace figurine::inspect

@@ -1,0 +1,127 @@
+// figurine-inspect as its users meet it: exit codes, one line for each refusal, JSON that does not drift, differences that are the right
+// ones.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+
+#include "formats/package_samples.h"
+
+namespace figurine {
+namespace {
+
+const std::string kGolden = FIGURINE_SOURCE_DIR "/tests/golden/packages/";
+
+struct Outcome {
+  int exit_code = -1;
+  std::string out, err;
+};
+
+std::string read_text(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::string write_bytes(const std::string& name, const std::vector<std::byte>& bytes) {
+  const std::string path = testing::TempDir() + "figurine_inspect_" + name;
+  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  return path;
+}
+
+// In the golden folder, so that paths in the output are short and the same everywhere.
+Outcome inspect(const std::string& arguments) {
+  const std::string out = testing::TempDir() + "figurine_inspect_out", err = testing::TempDir() + "figurine_inspect_err";
+  const int status =
+      std::system(("cd '" + kGolden + "' && '" FIGURINE_INSPECT "' " + arguments + " > '" + out + "' 2> '" + err + "'").c_str());
+  return {.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1, .out = read_text(out), .err = read_text(err)};
+}
+
+bool contains(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
+
+void expect_refused(const Outcome& run, const std::string& words) {
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_EQ(run.out, "");
+  EXPECT_TRUE(contains(run.err, words)) << run.err;
+  EXPECT_EQ(run.err.find('\n'), run.err.size() - 1) << run.err;
+  EXPECT_EQ(run.err.rfind("figurine-inspect: ", 0), 0u) << run.err;
+}
+
+TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
+  for (const std::string kind : {"body", "avatar", "motion"}) {
+    const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.err, "");
+    const std::string expected_path = kGolden + kind + "_v1.json";
+    if (std::getenv("FIGURINE_UPDATE_GOLDEN") != nullptr) std::ofstream(expected_path, std::ios::binary) << run.out;
+    EXPECT_EQ(run.out, read_text(expected_path)) << expected_path;
+  }
+}
+
+TEST(Inspect, PrintsWhatADeviceNeedsToKnow) {
+  const Outcome avatar = inspect("avatar_v1.fgn");
+  EXPECT_EQ(avatar.exit_code, 0);
+  for (const char* words : {"peak memory       1.05 MB", "MACs a frame      27352", "Gaussians         5", "metre", "OpenCV", "sRGB",
+                            "853 parameters", "fedcba98765432100123456789abcdef", "psnr_pose_db = 31.25", "CC0-1.0", "synthetic"}) {
+    EXPECT_TRUE(contains(avatar.out, words)) << words << "\n" << avatar.out;
+  }
+  EXPECT_FALSE(contains(avatar.out, "network.0.weights"));
+  const Outcome body = inspect("body_v1.fgn --tensors");
+  for (const char* words : {"0 pelvis  1 spine1  2 head", "rest pose", "8x8 texels, 5 covered, 3 border", "body.texel_weights", "[5,8]"}) {
+    EXPECT_TRUE(contains(body.out, words)) << words << "\n" << body.out;
+  }
+}
+
+TEST(Inspect, RefusesUnsoundPackagesWithOneLine) {
+  std::vector<std::byte> bytes = *samples::AvatarSample().write();
+  bytes[bytes.size() / 2] ^= std::byte{4};
+  expect_refused(inspect(write_bytes("flipped.fgn", bytes)), "checksum does not match");
+  expect_refused(inspect(write_bytes("flipped.fgn", bytes) + " --json"), "checksum does not match");
+  expect_refused(inspect("avatar_v1.fgn --diff " + write_bytes("flipped.fgn", bytes)), "checksum does not match");
+  bytes.resize(100);
+  expect_refused(inspect(write_bytes("cut.fgn", bytes)), "cut.fgn: header.file_bytes");
+  expect_refused(inspect(write_bytes("empty.fgn", {})), "empty.fgn: header: the file has 0 bytes");
+  expect_refused(inspect("no_such_file.fgn"), "no_such_file.fgn");
+  expect_refused(inspect("avatar_v1.json"), "avatar_v1.json: header.magic: not a figurine package");
+  expect_refused(inspect("."), ".");
+}
+
+TEST(Inspect, WrongUsageExitsTwo) {
+  for (const char* arguments :
+       {"", "--no-such-option", "avatar_v1.fgn body_v1.fgn", "avatar_v1.fgn --diff", "body_v1.fgn --diff body_v1.fgn --tensors"}) {
+    const Outcome run = inspect(arguments);
+    EXPECT_EQ(run.exit_code, 2) << arguments;
+    EXPECT_EQ(run.out, "") << arguments;
+  }
+  EXPECT_EQ(inspect("--help").exit_code, 0);
+  EXPECT_EQ(inspect("--version").exit_code, 0);
+}
+
+TEST(Inspect, DiffNamesEveryDifferenceAndNoOther) {
+  EXPECT_TRUE(contains(inspect("avatar_v1.fgn --diff avatar_v1.fgn").out, "the same content"));
+  EXPECT_TRUE(contains(inspect("avatar_v1.fgn --json --diff avatar_v1.fgn").out, "\"same\": true"));
+
+  samples::AvatarSample sample;
+  sample.avatar.name = "other";
+  sample.weights[0][7] += 0.25f;
+  sample.weights[0][9] -= 0.5f;
+  sample.avatar.shape = sample.avatar.shape.first(1);
+  const std::string other = write_bytes("other.fgn", *sample.write());
+  const Outcome text = inspect("avatar_v1.fgn --diff " + other);
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_TRUE(contains(text.out, "/name: \"sample avatar\" -> \"other\"")) << text.out;
+  EXPECT_TRUE(contains(text.out, "/avatar/shape/1: -1.25 -> null")) << text.out;
+  EXPECT_TRUE(contains(text.out, "avatar.shape: f32 [2] -> f32 [1]")) << text.out;
+  EXPECT_TRUE(contains(text.out, "network.0.weights: 2 of 180 values differ, largest difference 0.5,")) << text.out;
+  EXPECT_TRUE(contains(text.out, "2 fields and 2 tensors differ")) << text.out;
+  EXPECT_TRUE(contains(inspect("avatar_v1.fgn --json --diff " + other).out, "\"max_abs_difference\": 0.5"));
+
+  const Outcome kinds = inspect("avatar_v1.fgn --diff motion_v1.fgn");
+  EXPECT_EQ(kinds.exit_code, 0);
+  EXPECT_TRUE(contains(kinds.out, "/kind: \"avatar\" -> \"motion\"")) << kinds.out;
+  EXPECT_TRUE(contains(kinds.out, "motion.rotations: only in b")) << kinds.out;
+}
+
+}  // namespace
+}  // namespace figurine
