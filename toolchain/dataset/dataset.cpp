@@ -123,10 +123,6 @@ Camera read_camera(const JsonField& extrinsics, const std::vector<double>& intri
     camera.view_from_world[row * 4 + 3] = static_cast<float>(translation[row] * scale);
   }
   throw_if_error(validate_camera(camera), extrinsics.where());
-  const double determinant = rotation[0] * (rotation[4] * rotation[8] - rotation[5] * rotation[7]) -
-                             rotation[1] * (rotation[3] * rotation[8] - rotation[5] * rotation[6]) +
-                             rotation[2] * (rotation[3] * rotation[7] - rotation[4] * rotation[6]);
-  if (determinant < 0) extrinsics["rotation"].fail("mirrors: its determinant is negative");
   return camera;
 }
 

