@@ -1,8 +1,7 @@
-// The first stage's image loss: L1 + SSIM + mask, forward and analytic backward fused in threaded C++.
+// The first stage's image loss: L1 + SSIM (ssim.h) + mask, forward and analytic backward fused in threaded C++.
 //
-// Weights are the paper's, 1.0 / 0.1 / 0.1; its LPIPS term (0.01) is left out: no pretrained AlexNet can be had from the platform's
-// packages. SSIM as in 3DGS: 11x11 Gaussian window, sigma 1.5, zero padding, constants 0.01^2 and 0.03^2, mean over all pixels and
-// channels; loss 1 - SSIM. Based on: Wang et al., Image Quality Assessment: From Error Visibility to Structural Similarity, 2004, eq. 13.
+// Weights are the paper's, 1.0 / 0.1 / 0.1, for L1, 1 - SSIM and L1 of the mask; its LPIPS term (0.01) is left out: no pretrained AlexNet
+// can be had from the platform's packages.
 #pragma once
 
 #include <torch/torch.h>
@@ -32,13 +31,5 @@ struct LossTerms {
 // `background`: colour + (1 - alpha) background. Returns the scalar loss, differentiable by image; terms (may be null) are filled at once.
 torch::Tensor image_loss(const torch::Tensor& image, const torch::Tensor& target, const std::array<float, 3>& background,
                          const LossOptions& options, LossTerms* terms);
-
-// SSIM of two planar images [channels,h,w] and, where gradient is not null, d(mean SSIM)/dx, same shape. For tests in double, training in
-// float.
-template <class Scalar>
-Scalar ssim(const Scalar* x, const Scalar* y, uint32_t channels, uint32_t height, uint32_t width, uint32_t threads, Scalar* gradient);
-
-extern template float ssim(const float*, const float*, uint32_t, uint32_t, uint32_t, uint32_t, float*);
-extern template double ssim(const double*, const double*, uint32_t, uint32_t, uint32_t, uint32_t, double*);
 
 }  // namespace figurine::model

@@ -13,6 +13,8 @@ struct RenderView {
   PixelRect crop;  // only these pixels are computed
 };
 
+struct RendererState;  // render.cpp
+
 // Renders with buffers that are reused from call to call. One AvatarRenderer serves one training loop: a call's backward must be done
 // before the next call.
 class AvatarRenderer {
@@ -29,8 +31,7 @@ class AvatarRenderer {
   const SplatterStatistics& statistics() const;
 
  private:
-  struct Impl;
-  std::shared_ptr<Impl> impl_;
+  c10::intrusive_ptr<RendererState> state_;
 };
 
 }  // namespace figurine::model

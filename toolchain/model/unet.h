@@ -1,4 +1,4 @@
-// The pose UNet as a trainable module, built from figurine::Network (make_pose_unet), and the optimiser over its weights.
+// The pose UNet as a trainable module, built from figurine::Network (make_pose_unet).
 //
 // All weights live in one flat float tensor, layer after layer: kernel [out,k,k,in] (OHWI, as the package stores it), then bias. One token
 // of the sampler is one layer's stretch of it. Convolutions run channels-last, in bf16 if asked for (the head stays in float).
@@ -35,7 +35,7 @@ class PoseUNet {
   torch::Tensor forward(const torch::Tensor& input);
 
   torch::Tensor& weights();    // [P] flat float; a leaf that requires a gradient
-  torch::Tensor& gradients();  // [P] flat float; backward passes add to it
+  torch::Tensor& gradients();  // [P] flat float; backward passes add to it, undefined before the first
   void zero_gradients();
 
   uint64_t parameter_count() const;
@@ -49,27 +49,6 @@ class PoseUNet {
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
-};
-
-struct AdamWOptions {
-  double beta1 = 0.9, beta2 = 0.999;
-  double epsilon = 1e-10;  // 1e-8 may swallow the small gradients of a mean loss
-  double weight_decay = 0.0;
-};
-
-// AdamW over one flat tensor in one pass. Based on: Loshchilov & Hutter, Decoupled Weight Decay Regularization, 2019, algorithm 2.
-class AdamW {
- public:
-  AdamW(uint64_t parameters, const AdamWOptions& options);
-  // weights and gradients: [P] float. A gradient that is not finite leaves everything as it was and returns false.
-  bool step(torch::Tensor& weights, const torch::Tensor& gradients, double learning_rate);
-
-  // State for checkpoints: first and second moments [P] and the number of steps.
-  torch::Tensor first_moment, second_moment;
-  int64_t steps = 0;
-
- private:
-  AdamWOptions options_;
 };
 
 }  // namespace figurine::model

@@ -11,8 +11,13 @@
 #include <vector>
 
 #include "tests/toolchain/model/synthetic_body.h"
+#include "toolchain/model/adamw.h"
 #include "toolchain/model/head.h"
+#include "toolchain/model/loss.h"
+#include "toolchain/model/render.h"
 #include "toolchain/model/splatter.h"
+#include "toolchain/model/ssim.h"
+#include "toolchain/model/unet.h"
 
 namespace {
 
@@ -47,11 +52,35 @@ int main(int argc, char** argv) {
   GaussianBuffer<float> gaussians, gradients;
   gradients.resize(capsule.body.texel_count(), 0);
   Splatter<float> splatter({.threads = threads});
+  torch::set_num_threads(static_cast<int>(threads));
+  const bool bf16 = argc <= 3 || std::string(argv[3]) == "bf16";
+  PoseUNet unet(make_pose_unet(128, 26, 32, head_channels(0)), {.precision = bf16 ? Precision::kBfloat16 : Precision::kFloat32, .seed = 1});
+  AdamW adamw(unet.parameter_count(), {});
+  AvatarRenderer renderer({.threads = threads});
+  const torch::Tensor input = torch::randn({128, 128, 26}), head_weights = torch::randn({128, 128, 14});
+  torch::Tensor unet_head;
+  SsimScratch<float> scratch;
+  std::vector<float> ssim_gradient(3 * 512 * 512), other(3 * 512 * 512, 0.4f);
+  const torch::Tensor target = torch::rand({4, 512, 512});
+  LossTerms terms;
+  const LossOptions loss_options{.threads = threads};
+  const auto iterate = [&] {
+    unet.zero_gradients();
+    const torch::Tensor picture = renderer.render(unet.forward(input), frame, {camera, crop});
+    image_loss(picture, target, {0.5f, 0.5f, 0.5f}, loss_options, &terms).backward();
+    adamw.step(unet.weights(), unet.gradients(), 1e-4);
+  };
   std::vector<Row> rows{
       {"decode", [&] { decode_head(frame, head.data(), threads, gaussians); }, {}},
       {"splat forward", [&] { splatter.forward(gaussians.view(), camera, crop, image.data()); }, {}},
       {"splat backward", [&] { splatter.backward(image.data(), image_gradient.data(), gradients.gradients()); }, {}},
       {"decode backward", [&] { decode_head_backward(frame, head.data(), gradients, threads, head_gradient.data()); }, {}},
+      {"SSIM, both ways", [&] { ssim<float>({image.data(), other.data(), 3, 512, 512}, threads, scratch, ssim_gradient.data()); }, {}},
+      {"whole loss", [&] { image_loss(torch::from_blob(image.data(), {4, 512, 512}), target, {0.5f, 0.5f, 0.5f}, loss_options, &terms); }, {}},
+      {"UNet forward", [&] { unet_head = unet.forward(input); }, {}},
+      {"UNet backward", [&] { unet.zero_gradients(), unet_head.backward(head_weights); }, {}},
+      {"AdamW", [&] { adamw.step(unet.weights(), unet.gradients(), 1e-5); }, {}},
+      {"whole iteration", iterate, {}},
   };
   for (int round = 0; round < rounds; ++round) {
     for (Row& row : rows) {

@@ -1,0 +1,264 @@
+#include "toolchain/model/unet.h"
+
+#include <cmath>
+#include <string>
+
+#include "toolchain/error.h"
+
+namespace figurine::model {
+
+namespace {
+
+constexpr at::MemoryFormat kChannelsLast = at::MemoryFormat::ChannelsLast;
+
+// SplitMix64 (Steele et al., Fast Splittable Pseudorandom Number Generators, 2014): integers only, so the same everywhere.
+class Random {
+ public:
+  explicit Random(uint64_t seed) : state_(seed) {}
+  // Uniform in [-1, 1), a multiple of 2^-23: exact in float.
+  float uniform() {
+    state_ += 0x9e3779b97f4a7c15ull;
+    uint64_t z = state_;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+    z ^= z >> 31;
+    return static_cast<float>(static_cast<int64_t>(z >> 40) - (int64_t(1) << 23)) * 0x1p-23f;
+  }
+
+ private:
+  uint64_t state_;
+};
+
+}  // namespace
+
+// Where a convolution's parameters lie in the flat tensor: kernel [out,k,k,in], then bias [out].
+struct ConvolutionSlot {
+  int64_t weights = 0, bias = 0;
+  int64_t in = 0, out = 0, kernel = 0;
+  int64_t end() const { return bias + out; }
+};
+
+// The network's shape; shared with the graph's nodes.
+struct UNetPlan : torch::CustomClassHolder {
+  Network network;  // without weights
+  std::vector<ValueShape> shapes;
+  std::vector<ConvolutionSlot> slots;  // [layers]; meaningful for convolutions
+  int64_t parameters = 0;
+  Precision precision = Precision::kBfloat16;
+
+  bool is_head(size_t layer) const { return layer + 1 == network.layers.size(); }
+  // The head stays in float, whatever the other convolutions do.
+  torch::ScalarType type_of(size_t layer) const {
+    return precision == Precision::kBfloat16 && !is_head(layer) ? torch::kBFloat16 : torch::kFloat;
+  }
+  // A view of flat as [out,in,k,k] in channels-last strides: no copy.
+  static torch::Tensor kernel_of(const torch::Tensor& flat, const ConvolutionSlot& slot) {
+    return flat.narrow(0, slot.weights, slot.bias - slot.weights).view({slot.out, slot.kernel, slot.kernel, slot.in}).permute({0, 3, 1, 2});
+  }
+  static torch::Tensor bias_of(const torch::Tensor& flat, const ConvolutionSlot& slot) { return flat.narrow(0, slot.bias, slot.out); }
+};
+
+namespace {
+
+// The whole network as one node of the graph: forward keeps every value, backward walks the layers in reverse. Saves the per-operation cost
+// of autograd and of autocast's casts, and writes all weight gradients into one flat tensor.
+class RunUNet : public torch::autograd::Function<RunUNet> {
+ public:
+  static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::Tensor& flat, const torch::Tensor& input,
+                               const c10::intrusive_ptr<UNetPlan>& plan) {
+    const std::vector<Layer>& layers = plan->network.layers;
+    std::vector<torch::Tensor> values(layers.size() + 1), extra(layers.size());
+    values[0] = input.permute({2, 0, 1}).unsqueeze(0).to(plan->type_of(0));  // NHWC in memory, seen as NCHW channels-last
+    for (size_t i = 0; i < layers.size(); ++i) {
+      const torch::Tensor& a = values[layers[i].inputs[0]];
+      torch::Tensor& out = values[i + 1];
+      switch (layers[i].op) {
+        case LayerOp::kConv2d: {
+          const torch::ScalarType type = plan->type_of(i);
+          const ConvolutionSlot& slot = plan->slots[i];
+          extra[i] = UNetPlan::kernel_of(flat, slot).to(type);
+          out = at::convolution(a.to(type), extra[i], UNetPlan::bias_of(flat, slot).to(type), {1, 1}, padding(slot), {1, 1}, false, {0, 0},
+                                1);
+          if (layers[i].relu) out.relu_();
+          break;
+        }
+        case LayerOp::kMaxPool2:
+          std::tie(out, extra[i]) = at::max_pool2d_with_indices(a, {2, 2}, {2, 2});
+          break;
+        case LayerOp::kUpsample2:
+          out = at::upsample_bilinear2d(a, {2 * a.size(2), 2 * a.size(3)}, false);
+          break;
+        case LayerOp::kConcat:
+          out = at::cat({a, values[layers[i].inputs[1]]}, 1);
+          break;
+      }
+    }
+    torch::Tensor head = values.back().permute({0, 2, 3, 1}).squeeze(0).contiguous();
+    values.back() = torch::Tensor();  // the backward pass does not need it
+    context->saved_data["plan"] = c10::IValue::make_capsule(plan);
+    context->saved_data["values"] = std::move(values);
+    context->saved_data["extra"] = std::move(extra);
+    return head;
+  }
+
+  static torch::autograd::tensor_list backward(torch::autograd::AutogradContext* context, torch::autograd::tensor_list output_gradients) {
+    const auto plan = c10::static_intrusive_pointer_cast<UNetPlan>(context->saved_data["plan"].toCapsule());
+    const std::vector<torch::Tensor> values = context->saved_data["values"].toTensorVector(),
+                                     extra = context->saved_data["extra"].toTensorVector();
+    const std::vector<Layer>& layers = plan->network.layers;
+    torch::Tensor flat = torch::empty({plan->parameters});
+    std::vector<torch::Tensor> gradients(layers.size() + 1);
+    gradients.back() = output_gradients[0].permute({2, 0, 1}).unsqueeze(0);
+    // A value that several layers read gets the sum of their gradients; the layers run in reverse, so it is complete when its own layer
+    // comes.
+    const auto give = [&](uint32_t value, torch::Tensor gradient) {
+      gradients[value] = gradients[value].defined() ? gradients[value].add_(gradient) : std::move(gradient);
+    };
+    for (size_t i = layers.size(); i-- > 0;) {
+      const Layer& layer = layers[i];
+      torch::Tensor gradient = std::move(gradients[i + 1]);
+      const torch::Tensor& a = values[layer.inputs[0]];
+      if (!gradient.defined()) {  // nothing reads this value
+        if (layer.op == LayerOp::kConv2d) flat.narrow(0, plan->slots[i].weights, plan->slots[i].end() - plan->slots[i].weights).zero_();
+        continue;
+      }
+      switch (layer.op) {
+        case LayerOp::kConv2d: {
+          const torch::ScalarType type = plan->type_of(i);
+          const ConvolutionSlot& slot = plan->slots[i];
+          if (layer.relu) gradient = at::threshold_backward(gradient, values[i + 1], 0);
+          const bool to_input = layer.inputs[0] != 0;
+          const int64_t bias_size = slot.out;
+          auto [d_input, d_kernel, d_bias] =
+              at::convolution_backward(gradient.to(type), a.to(type), extra[i], at::IntArrayRef(bias_size), {1, 1}, padding(slot), {1, 1},
+                                       false, {0, 0}, 1, {to_input, true, true});
+          UNetPlan::kernel_of(flat, slot).copy_(d_kernel);
+          UNetPlan::bias_of(flat, slot).copy_(d_bias);
+          if (to_input) give(layer.inputs[0], d_input.to(a.scalar_type()));
+          break;
+        }
+        case LayerOp::kMaxPool2:
+          give(layer.inputs[0], at::max_pool2d_with_indices_backward(gradient, a, {2, 2}, {2, 2}, {0, 0}, {1, 1}, false, extra[i]));
+          break;
+        case LayerOp::kUpsample2:
+          give(layer.inputs[0], at::upsample_bilinear2d_backward(gradient, {2 * a.size(2), 2 * a.size(3)}, a.sizes(), false));
+          break;
+        case LayerOp::kConcat: {
+          const int64_t first = a.size(1);
+          give(layer.inputs[0], gradient.narrow(1, 0, first).contiguous(kChannelsLast));
+          give(layer.inputs[1], gradient.narrow(1, first, gradient.size(1) - first).contiguous(kChannelsLast));
+          break;
+        }
+      }
+    }
+    return {flat, {}, {}};
+  }
+
+ private:
+  static std::vector<int64_t> padding(const ConvolutionSlot& slot) { return {slot.kernel / 2, slot.kernel / 2}; }
+};
+
+}  // namespace
+
+struct PoseUNet::Impl {
+  c10::intrusive_ptr<UNetPlan> plan = c10::make_intrusive<UNetPlan>();
+  torch::Tensor weights;
+};
+
+PoseUNet::PoseUNet(const Network& network, const PoseUNetOptions& options) : impl_(std::make_unique<Impl>()) {
+  UNetPlan& plan = *impl_->plan;
+  plan.network = network;
+  plan.precision = options.precision;
+  plan.shapes = value_or_throw(infer_shapes(network, false), "pose UNet");
+  if (network.layers.back().op != LayerOp::kConv2d) throw InputError("pose UNet: network: the last layer is not a convolution");
+  plan.slots.resize(network.layers.size());
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    Layer& layer = plan.network.layers[i];
+    layer.weights = layer.bias = {};
+    if (layer.op != LayerOp::kConv2d) continue;
+    ConvolutionSlot& slot = plan.slots[i];
+    slot.in = plan.shapes[layer.inputs[0]].channels;
+    slot.out = layer.out_channels;
+    slot.kernel = layer.kernel;
+    slot.weights = plan.parameters;
+    slot.bias = slot.weights + slot.out * slot.kernel * slot.kernel * slot.in;
+    plan.parameters = slot.end();
+  }
+  // He et al., Delving Deep into Rectifiers, 2015, eq. 10, with a uniform distribution of the same variance: no libm but sqrt, which is
+  // exact everywhere.
+  impl_->weights = torch::zeros({plan.parameters});
+  float* const flat = impl_->weights.mutable_data_ptr<float>();
+  Random random(options.seed);
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    if (network.layers[i].op != LayerOp::kConv2d) continue;
+    const ConvolutionSlot& slot = plan.slots[i];
+    float bound = std::sqrt(6.0f / static_cast<float>(slot.kernel * slot.kernel * slot.in));
+    if (plan.is_head(i)) bound *= options.head_weight_factor;
+    for (int64_t k = slot.weights; k < slot.bias; ++k) flat[k] = bound * random.uniform();
+    if (plan.is_head(i) && slot.out >= 14) {
+      for (int64_t channel = 11; channel < 14; ++channel) flat[slot.bias + channel] = options.rgb_bias;
+    }
+  }
+  impl_->weights.requires_grad_();
+}
+
+PoseUNet::~PoseUNet() = default;
+
+torch::Tensor PoseUNet::forward(const torch::Tensor& input) {
+  const UNetPlan& plan = *impl_->plan;
+  const int64_t size = plan.network.input_size, channels = plan.network.input_channels;
+  TORCH_CHECK(input.scalar_type() == torch::kFloat && input.is_contiguous() && input.sizes() == torch::IntArrayRef({size, size, channels}),
+              "PoseUNet: the input must be contiguous floats [", size, ",", size, ",", channels, "]");
+  return RunUNet::apply(impl_->weights, input, impl_->plan);
+}
+
+torch::Tensor& PoseUNet::weights() { return impl_->weights; }
+torch::Tensor& PoseUNet::gradients() { return impl_->weights.mutable_grad(); }
+void PoseUNet::zero_gradients() { impl_->weights.mutable_grad() = torch::Tensor(); }
+
+uint64_t PoseUNet::parameter_count() const { return static_cast<uint64_t>(impl_->plan->parameters); }
+
+std::vector<uint64_t> PoseUNet::token_lengths() const {
+  std::vector<uint64_t> lengths;
+  for (size_t i = 0; i < impl_->plan->slots.size(); ++i) {
+    const ConvolutionSlot& slot = impl_->plan->slots[i];
+    if (impl_->plan->network.layers[i].op == LayerOp::kConv2d) lengths.push_back(static_cast<uint64_t>(slot.end() - slot.weights));
+  }
+  return lengths;
+}
+
+Network PoseUNet::export_network(std::vector<float>& storage) const {
+  const float* flat = impl_->weights.const_data_ptr<float>();
+  storage.assign(flat, flat + impl_->plan->parameters);
+  Network network = impl_->plan->network;
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    if (network.layers[i].op != LayerOp::kConv2d) continue;
+    const ConvolutionSlot& slot = impl_->plan->slots[i];
+    network.layers[i].weights = {storage.data() + slot.weights, static_cast<size_t>(slot.bias - slot.weights)};
+    network.layers[i].bias = {storage.data() + slot.bias, static_cast<size_t>(slot.out)};
+  }
+  return network;
+}
+
+void PoseUNet::import_network(const Network& network) {
+  const UNetPlan& plan = *impl_->plan;
+  value_or_throw(infer_shapes(network, true), "pose UNet");
+  const auto differs = [](const std::string& what) { throw InputError("pose UNet: network: " + what + " differs from this UNet's"); };
+  if (network.input_size != plan.network.input_size || network.input_channels != plan.network.input_channels) differs("the input's shape");
+  if (network.layers.size() != plan.network.layers.size()) differs("the number of layers");
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    const Layer &theirs = network.layers[i], &ours = plan.network.layers[i];
+    if (theirs.op != ours.op || theirs.inputs[0] != ours.inputs[0] || theirs.inputs[1] != ours.inputs[1] ||
+        theirs.out_channels != ours.out_channels || theirs.kernel != ours.kernel || theirs.relu != ours.relu) {
+      differs("layer " + std::to_string(i));
+    }
+  }
+  float* const flat = impl_->weights.mutable_data_ptr<float>();
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    if (network.layers[i].op != LayerOp::kConv2d) continue;
+    std::copy(network.layers[i].weights.begin(), network.layers[i].weights.end(), flat + plan.slots[i].weights);
+    std::copy(network.layers[i].bias.begin(), network.layers[i].bias.end(), flat + plan.slots[i].bias);
+  }
+}
+
+}  // namespace figurine::model
