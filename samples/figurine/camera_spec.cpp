@@ -90,6 +90,19 @@ Result<Camera> parse_camera_json(const std::string& text, const std::string& nam
   return camera;
 }
 
+nlohmann::ordered_json camera_json(const Camera& camera) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (int r = 0; r < 3; ++r) {
+    const float* row = &camera.view_from_world[4 * r];
+    rows.push_back({row[0], row[1], row[2], row[3]});
+  }
+  return {{"width", camera.width_px},
+          {"height", camera.height_px},
+          {"intrinsics", {{camera.fx_px, 0, camera.cx_px}, {0, camera.fy_px, camera.cy_px}, {0, 0, 1}}},
+          {"world_to_camera", rows},
+          {"near", camera.near_m}};
+}
+
 Result<Camera> resize_camera(const Camera& camera, ImageSize size) {
   Camera result = camera;
   result.width_px = size.width_px;

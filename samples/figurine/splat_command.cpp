@@ -135,6 +135,7 @@ Status run_splat(const SplatCommandOptions& options) {
     json["left_out"] = cloud->left_out;
     json["sh_degree"] = cloud->sh_degree;
     json["size"] = {size.width_px, size.height_px};
+    json["camera"] = camera_json(*camera);
     json["stages_ms"] = log.stages_json();
     json["work"] = log.work_json();
     json["peak_memory_bytes"] = peak_memory_bytes();

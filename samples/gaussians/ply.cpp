@@ -215,7 +215,7 @@ class Cursor {
     while (at_ < body_.size() && blank(text[at_])) ++at_;
     size_t end = at_;
     while (end < body_.size() && !blank(text[end])) ++end;
-    if (at_ < end && text[at_] == '+') ++at_;  // from_chars takes no plus sign
+    if (end - at_ > 1 && text[at_] == '+' && text[at_ + 1] != '-') ++at_;  // from_chars takes no plus sign
     const auto [stop, error] = std::from_chars(text + at_, text + end, value);
     if (error == std::errc::result_out_of_range) {
       // Too small or too large for a double: which of them does not matter to a float, the sign of the exponent decides.

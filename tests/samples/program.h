@@ -1,0 +1,46 @@
+// Runs the built figurine the way a user does, in a folder of its own with synthetic packages in it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace figurine::tests {
+
+// A fresh folder below the system's temporary one, removed with everything in it.
+class TestFolder {
+ public:
+  TestFolder();
+  ~TestFolder();
+  TestFolder(const TestFolder&) = delete;
+  TestFolder& operator=(const TestFolder&) = delete;
+  std::string path(const std::string& name = "") const;
+  void write(const std::string& name, const std::string& content) const;
+  std::string read(const std::string& name) const;
+  bool has(const std::string& name) const { return std::filesystem::exists(path(name)); }
+  std::vector<std::string> names() const;  // of everything in it, hidden files included, sorted
+
+ private:
+  std::filesystem::path path_;
+};
+
+struct ProgramRun {
+  int exit_code = -1;  // 128 + the signal if one ended it
+  std::string out, err;
+  size_t error_lines() const;
+};
+
+struct RunOptions {
+  std::string environment;  // "NAME=value NAME=value "
+  std::string before;       // shell commands in front, such as "ulimit -f 8;"
+  std::string folder;       // working folder
+};
+
+// "figurine ARGUMENTS", arguments as the shell reads them.
+ProgramRun run_figurine(const std::string& arguments, const RunOptions& options = {});
+ProgramRun run_shell(const std::string& command, const TestFolder& folder);
+
+// Writes body.fgn, avatar.fgn, motion.fgn (12 frames, 30 a second) and other_body.fgn, which does not fit the avatar.
+void write_test_packages(const TestFolder& folder);
+
+}  // namespace figurine::tests
