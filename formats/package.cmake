@@ -11,7 +11,7 @@ add_custom_command(
 add_custom_target(figurine_schema DEPENDS "${schema_header}")
 
 add_library(figurine_formats STATIC
-  src/checksum.cpp src/package.cpp src/package_avatar.cpp src/package_body.cpp src/package_container.cpp src/package_content.cpp src/package_text.cpp)
+  src/checksum.cpp src/package.cpp src/package_avatar.cpp src/package_body.cpp src/package_container.cpp src/package_content.cpp src/package_text.cpp src/refusal.cpp)
 add_dependencies(figurine_formats figurine_schema)
 target_link_libraries(figurine_formats PUBLIC figurine_words)
 target_include_directories(figurine_formats PRIVATE "${PROJECT_SOURCE_DIR}")

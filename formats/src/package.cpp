@@ -1,6 +1,5 @@
 #include "figurine/package.h"
 
-#include <algorithm>
 #include <variant>
 
 #include "formats/src/package_content.h"
@@ -127,42 +126,42 @@ std::string format_hash(const std::array<uint64_t, 2>& hash) {
 }
 
 Status check_avatar_fits_body(const Avatar& avatar, const Package& package) {
-  const auto mismatch = [&](const std::string& why) {
-    return Status(StatusCode::kMismatch, "avatar '" + avatar.name + "' does not fit the body: " + why);
+  const auto mismatch = [&](std::initializer_list<Word> why) {
+    return refuse(StatusCode::kMismatch, concatenate({"avatar '", avatar.name, "' does not fit the body"}), why);
   };
-  if (package.kind() != PackageKind::kBody) return mismatch(std::string("the other package is of kind ") + to_string(package.kind()));
+  if (package.kind() != PackageKind::kBody) return mismatch({"the other package is of kind ", to_string(package.kind())});
   const Body& body = package.body();
   if (avatar.body_hash != package.content_hash()) {
-    return mismatch("made for '" + avatar.body_name + "' " + format_hash(avatar.body_hash) + ", this is '" + body.name + "' " +
-                    format_hash(package.content_hash()));
+    return mismatch({"made for '", avatar.body_name, "' ", format_hash(avatar.body_hash), ", this is '", body.name, "' ",
+                     format_hash(package.content_hash())});
   }
   if (avatar.network.input_size != body.uv_size) {
-    return mismatch("its map has " + std::to_string(avatar.network.input_size) + " texels a side, the body's " +
-                    std::to_string(body.uv_size));
+    return mismatch({"its map has ", avatar.network.input_size, " texels a side, the body's ", body.uv_size});
   }
   if (avatar.shape.size() > body.shape_count()) {
-    return mismatch("it has " + std::to_string(avatar.shape.size()) + " shape coefficients, the body " +
-                    std::to_string(body.shape_count()));
+    return mismatch({"it has ", avatar.shape.size(), " shape coefficients, the body ", body.shape_count()});
   }
   if (!avatar.golden.rotations.empty() && avatar.golden.rotations.size() != size_t{body.joint_count()} * 4) {
-    return mismatch("its golden pose has " + std::to_string(avatar.golden.rotations.size() / 4) + " joints, the body " +
-                    std::to_string(body.joint_count()));
+    return mismatch({"its golden pose has ", avatar.golden.rotations.size() / 4, " joints, the body ", body.joint_count()});
   }
   for (uint8_t joint : avatar.pose_statistics.joints) {
-    if (joint >= body.joint_count()) return mismatch("its pose statistics name joint " + std::to_string(joint));
+    if (joint >= body.joint_count()) return mismatch({"its pose statistics name joint ", joint});
   }
   return {};
 }
 
 Status check_motion_fits_body(const Motion& motion, const Body& body) {
+  const auto mismatch = [&](std::initializer_list<Word> why) {
+    return refuse(StatusCode::kMismatch, concatenate({"motion '", motion.name, "' does not fit the body '", body.name, "'"}), why);
+  };
   if (motion.joint_names.size() != body.joint_names.size()) {
-    return Status(StatusCode::kMismatch, "motion '" + motion.name + "' has " + std::to_string(motion.joint_names.size()) +
-                                             " joints, body '" + body.name + "' has " + std::to_string(body.joint_names.size()));
+    return mismatch({"it has ", motion.joint_names.size(), " joints, the body ", body.joint_names.size()});
   }
-  const auto [theirs, ours] = std::mismatch(motion.joint_names.begin(), motion.joint_names.end(), body.joint_names.begin());
-  if (theirs == motion.joint_names.end()) return {};
-  return Status(StatusCode::kMismatch, "motion '" + motion.name + "': joint " + std::to_string(theirs - motion.joint_names.begin()) +
-                                           " is '" + *theirs + "', body '" + body.name + "' has '" + *ours + "'");
+  for (size_t j = 0; j < body.joint_names.size(); ++j) {
+    if (motion.joint_names[j] == body.joint_names[j]) continue;
+    return mismatch({"its joint ", j, " is '", motion.joint_names[j], "', the body's '", body.joint_names[j], "'"});
+  }
+  return {};
 }
 
 }  // namespace figurine

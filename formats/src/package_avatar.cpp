@@ -16,11 +16,10 @@ Status read_map_statistics(const schema::MapStatistics& table, MapStatistics& ou
   for (uint32_t c = 0; c < kMapChannels; ++c) {
     out.mean[c] = table.mean()->Get(c);
     out.scale[c] = table.scale()->Get(c);
-    const std::string at = "channel " + std::to_string(c) + ": ";
     if (!(std::fabs(out.mean[c]) <= layout::kMaxLengthM))
-      return corrupt("avatar.map_statistics", at + "the mean is not finite or too large");
+      return corrupt("avatar.map_statistics", "channel ", c, ": the mean is not finite or too large");
     if (!(out.scale[c] > 0 && out.scale[c] <= 1e6f))
-      return corrupt("avatar.map_statistics", at + "the scale is not positive, or too large");
+      return corrupt("avatar.map_statistics", "channel ", c, ": the scale is not positive, or too large");
   }
   return {};
 }
@@ -36,7 +35,7 @@ Status read_decoding(const schema::HeadDecoding& table, HeadDecoding& out) {
   if (!within(out.spacing_scale, 100)) return corrupt("avatar.decoding.spacing_scale", "is not above 0 and at most 100");
   if (!within(out.max_log_scale, 20)) return corrupt("avatar.decoding.max_log_scale", "is not above 0 and at most 20");
   if (!(std::fabs(out.opacity_bias) <= 100)) return corrupt("avatar.decoding.opacity_bias", "is not within -100 and 100");
-  if (out.sh_degree > kMaxShDegree) return corrupt("avatar.decoding.sh_degree", "is above " + std::to_string(kMaxShDegree));
+  if (out.sh_degree > kMaxShDegree) return corrupt("avatar.decoding.sh_degree", "is above ", kMaxShDegree);
   return {};
 }
 
@@ -44,8 +43,7 @@ Status read_decoding(const schema::HeadDecoding& table, HeadDecoding& out) {
 Status read_network(const schema::Network& table, BlobReader& blobs, Network& out) {
   out.input_size = table.input_size();
   out.input_channels = table.input_channels();
-  if (table.layers()->size() > kMaxLayers)
-    return Status(StatusCode::kLimitExceeded, "network: more than " + std::to_string(kMaxLayers) + " layers");
+  if (table.layers()->size() > kMaxLayers) return over_limit("network", "more than ", kMaxLayers, " layers");
   for (const schema::Layer* entry : *table.layers()) {
     out.layers.push_back({.op = static_cast<LayerOp>(entry->op()),
                           .inputs = {entry->input_a(), entry->input_b()},
@@ -58,7 +56,7 @@ Status read_network(const schema::Network& table, BlobReader& blobs, Network& ou
   for (size_t i = 0; i < out.layers.size(); ++i) {
     Layer& layer = out.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
-    const std::string name = "network." + std::to_string(i);
+    const std::string name = concatenate({"network.", i});
     const uint32_t in_channels = (*shapes)[layer.inputs[0]].channels;
     FIG_RETURN_IF_ERROR(blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, layer.weights));
     FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, layer.bias));
@@ -71,32 +69,28 @@ Status read_network(const schema::Network& table, BlobReader& blobs, Network& ou
 Status check_network_fits(const Avatar& avatar, const Budget& budget) {
   const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, true);
   if (avatar.network.input_size > kMaxUvSize) {
-    return Status(StatusCode::kLimitExceeded, "network.input_size: is larger than " + std::to_string(kMaxUvSize));
+    return over_limit("network.input_size", "is larger than ", kMaxUvSize);
   }
   if (avatar.fourier_octaves > layout::kMaxFourierOctaves) {
-    return Status(StatusCode::kLimitExceeded, "avatar.fourier_octaves: is above " + std::to_string(layout::kMaxFourierOctaves));
+    return over_limit("avatar.fourier_octaves", "is above ", layout::kMaxFourierOctaves);
   }
   if (const uint32_t channels = kMapChannels + 4 * avatar.fourier_octaves; avatar.network.input_channels != channels) {
-    return corrupt("network.input_channels",
-                   "is " + std::to_string(avatar.network.input_channels) + ", maps and Fourier channels make " + std::to_string(channels));
+    return corrupt("network.input_channels", "is ", avatar.network.input_channels, ", maps and Fourier channels make ", channels);
   }
   if (shapes.back().size != avatar.network.input_size) return corrupt("network", "the result does not have the size of the input");
   if (const uint32_t channels = head_channels(avatar.decoding.sh_degree); shapes.back().channels != channels) {
-    return corrupt("network",
-                   "the result has " + std::to_string(shapes.back().channels) + " channels, the head needs " + std::to_string(channels));
+    return corrupt("network", "the result has ", shapes.back().channels, " channels, the head needs ", channels);
   }
   uint64_t largest_value = 0;
   for (const ValueShape& shape : shapes) {
     largest_value = std::max(largest_value, uint64_t{shape.size} * shape.size * shape.channels * sizeof(float));
   }
-  if (largest_value > layout::kMaxValueBytes) return Status(StatusCode::kLimitExceeded, "network: an activation is larger than 1 GiB");
+  if (largest_value > layout::kMaxValueBytes) return over_limit("network", "an activation is larger than 1 GiB");
   if (budget.peak_memory_bytes != 0 && largest_value > budget.peak_memory_bytes) {
-    return Status(StatusCode::kLimitExceeded, "budget.peak_memory_bytes: declares " + std::to_string(budget.peak_memory_bytes) +
-                                                  ", one activation alone needs " + std::to_string(largest_value));
+    return over_limit("budget.peak_memory_bytes", "declares ", budget.peak_memory_bytes, ", one activation alone needs ", largest_value);
   }
   if (const uint64_t macs = count_macs(avatar.network, shapes); budget.macs_per_frame != 0 && macs > budget.macs_per_frame) {
-    return Status(StatusCode::kLimitExceeded, "budget.macs_per_frame: declares " + std::to_string(budget.macs_per_frame) +
-                                                  ", the network needs " + std::to_string(macs));
+    return over_limit("budget.macs_per_frame", "declares ", budget.macs_per_frame, ", the network needs ", macs);
   }
   if (budget.gaussians > uint64_t{avatar.network.input_size} * avatar.network.input_size) {
     return corrupt("budget.gaussians", "is more than the map has texels");
@@ -132,11 +126,11 @@ Status read_pose_statistics(const schema::PoseStatistics& table, BlobReader& blo
   FIG_RETURN_IF_ERROR(check_magnitude(out.mean, "pose.mean", 100));
   FIG_RETURN_IF_ERROR(check_magnitude(out.covariance, "pose.covariance", 1e4f));
   for (size_t i = 0; i < n; ++i) {
-    if (!(out.covariance[i * n + i] > 0)) return corrupt("pose.covariance", "row " + std::to_string(i) + ": the variance is not positive");
+    if (!(out.covariance[i * n + i] > 0)) return corrupt("pose.covariance", "row ", i, ": the variance is not positive");
     for (size_t j = 0; j < i; ++j) {
       const float a = out.covariance[i * n + j], b = out.covariance[j * n + i];
       if (std::fabs(a - b) > 1e-6f * std::max(std::fabs(a), std::fabs(b))) {
-        return corrupt("pose.covariance", "is not symmetric in row " + std::to_string(i) + ", column " + std::to_string(j));
+        return corrupt("pose.covariance", "is not symmetric in row ", i, ", column ", j);
       }
     }
   }
@@ -190,11 +184,11 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
   FIG_RETURN_IF_ERROR(read_text(table.body_name(), "avatar.body_name", layout::kMaxNameBytes, out.body_name));
   FIG_RETURN_IF_ERROR(read_text(table.preset(), "avatar.preset", layout::kMaxNameBytes, out.preset));
   out.body_hash = {table.body_hash_low(), table.body_hash_high()};
-  if (table.template_mode() > schema::TemplateMode::MAX) return Status(StatusCode::kUnsupported, "avatar.template_mode: is unknown");
+  if (table.template_mode() > schema::TemplateMode::MAX) return unsupported("avatar.template_mode", "is unknown");
   out.template_mode = static_cast<TemplateMode>(table.template_mode());
   FIG_RETURN_IF_ERROR(blobs.read("avatar.shape", {BlobReader::kAny}, out.shape, BlobReader::kMayBeAbsent));
   if (out.shape.size() > kMaxShapeCoefficients) {
-    return Status(StatusCode::kLimitExceeded, "avatar.shape: has more than " + std::to_string(kMaxShapeCoefficients) + " coefficients");
+    return over_limit("avatar.shape", "has more than ", kMaxShapeCoefficients, " coefficients");
   }
   FIG_RETURN_IF_ERROR(check_magnitude(out.shape, "avatar.shape", 1000));
   FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), out.map_statistics));

@@ -11,8 +11,7 @@ Status check_parents(const Body& body) {
   if (body.parents[0] != -1) return corrupt("body.parents", "joint 0 is not the root (parent -1)");
   for (size_t j = 1; j < body.parents.size(); ++j) {
     if (body.parents[j] < 0 || size_t(body.parents[j]) >= j) {
-      return corrupt("body.parents",
-                     "joint " + std::to_string(j) + ": parent " + std::to_string(body.parents[j]) + " is not an earlier joint");
+      return corrupt("body.parents", "joint ", j, ": parent ", body.parents[j], " is not an earlier joint");
     }
   }
   return {};
@@ -20,25 +19,23 @@ Status check_parents(const Body& body) {
 
 Status check_texels(const Body& body) {
   const uint32_t joints = body.joint_count();
-  const auto at = [](size_t i) { return "texel " + std::to_string(i) + ": "; };
   for (size_t i = 0; i < body.texel.size(); ++i) {
-    if (body.texel[i] >= body.uv_size * body.uv_size) return corrupt("body.texel", at(i) + "lies outside the map");
-    if (i > 0 && body.texel[i] <= body.texel[i - 1]) return corrupt("body.texel", at(i) + "is not after the one before");
+    if (body.texel[i] >= body.uv_size * body.uv_size) return corrupt("body.texel", "texel ", i, ": lies outside the map");
+    if (i > 0 && body.texel[i] <= body.texel[i - 1]) return corrupt("body.texel", "texel ", i, ": is not after the one before");
     if (!(body.texel_spacing_m[i] > 0 && body.texel_spacing_m[i] <= layout::kMaxLengthM)) {
-      return corrupt("body.texel_spacing", at(i) + "is not a positive length");
+      return corrupt("body.texel_spacing", "texel ", i, ": is not a positive length");
     }
     double normal2 = 0, weights = 0;
     for (size_t k = 0; k < 3; ++k) normal2 += double(body.texel_normal[i * 3 + k]) * body.texel_normal[i * 3 + k];
-    if (!(std::fabs(std::sqrt(normal2) - 1) <= 1e-3)) return corrupt("body.texel_normal", at(i) + "is not of unit length");
+    if (!(std::fabs(std::sqrt(normal2) - 1) <= 1e-3)) return corrupt("body.texel_normal", "texel ", i, ": is not of unit length");
     for (size_t k = i * kSkinInfluences; k < (i + 1) * kSkinInfluences; ++k) {
       if (body.texel_joints[k] >= joints) {
-        return corrupt("body.texel_joints", at(i) + "joint " + std::to_string(body.texel_joints[k]) + " of " + std::to_string(joints));
+        return corrupt("body.texel_joints", "texel ", i, ": joint ", body.texel_joints[k], " of ", joints);
       }
-      if (!(body.texel_weights[k] >= 0)) return corrupt("body.texel_weights", at(i) + "a weight is negative or not a number");
+      if (!(body.texel_weights[k] >= 0)) return corrupt("body.texel_weights", "texel ", i, ": a weight is negative or not a number");
       weights += body.texel_weights[k];
     }
-    if (!(std::fabs(weights - 1) <= 1e-4))
-      return corrupt("body.texel_weights", at(i) + "the weights sum to " + std::to_string(weights) + ", not 1");
+    if (!(std::fabs(weights - 1) <= 1e-4)) return corrupt("body.texel_weights", "texel ", i, ": the weights sum to ", weights, ", not 1");
   }
   return {};
 }
@@ -48,11 +45,10 @@ Status check_border(const Body& body) {
   std::vector<bool> taken(texels, false);
   for (uint32_t texel : body.texel) taken[texel] = true;
   for (size_t i = 0; i < body.border_texel.size(); ++i) {
-    const std::string at = "entry " + std::to_string(i) + ": ";
-    if (body.border_texel[i] >= texels) return corrupt("body.border_texel", at + "lies outside the map");
-    if (taken[body.border_texel[i]]) return corrupt("body.border_texel", at + "is covered or there twice");
+    if (body.border_texel[i] >= texels) return corrupt("body.border_texel", "entry ", i, ": lies outside the map");
+    if (taken[body.border_texel[i]]) return corrupt("body.border_texel", "entry ", i, ": is covered or there twice");
     taken[body.border_texel[i]] = true;
-    if (body.border_source[i] >= body.texel_count()) return corrupt("body.border_source", at + "is not a covered texel's row");
+    if (body.border_source[i] >= body.texel_count()) return corrupt("body.border_source", "entry ", i, ": is not a covered texel's row");
   }
   return {};
 }
@@ -67,7 +63,7 @@ Status read_body(const schema::Index& index, BlobReader& blobs, Body& out) {
   FIG_RETURN_IF_ERROR(read_joint_names(*table.joint_names(), "body.joint_names", out.joint_names));
   out.uv_size = table.uv_size();
   if (out.uv_size < 1) return corrupt("body.uv_size", "is zero");
-  if (out.uv_size > kMaxUvSize) return Status(StatusCode::kLimitExceeded, "body.uv_size: is larger than " + std::to_string(kMaxUvSize));
+  if (out.uv_size > kMaxUvSize) return over_limit("body.uv_size", "is larger than ", kMaxUvSize);
 
   const uint32_t joints = static_cast<uint32_t>(out.joint_names.size());
   FIG_RETURN_IF_ERROR(blobs.read("body.parents", {joints}, out.parents));
@@ -88,8 +84,7 @@ Status read_body(const schema::Index& index, BlobReader& blobs, Body& out) {
 
   const uint32_t shapes = out.shape_count();
   if (shapes > kMaxShapeCoefficients) {
-    return Status(StatusCode::kLimitExceeded,
-                  "body.joint_shape_basis: has more than " + std::to_string(kMaxShapeCoefficients) + " coefficients");
+    return over_limit("body.joint_shape_basis", "has more than ", kMaxShapeCoefficients, " coefficients");
   }
   if (out.texel_shape_basis_m.size() != size_t(shapes) * texels * 3) {
     return corrupt("body.texel_shape_basis", "does not have as many coefficients as body.joint_shape_basis");

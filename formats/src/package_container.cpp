@@ -13,37 +13,24 @@ using layout::Header;
 
 namespace {
 
-std::string to_hex(uint64_t value) {
-  std::string digits;
-  do {
-    digits.insert(digits.begin(), "0123456789abcdef"[value & 15]);
-    value >>= 4;
-  } while (value != 0);
-  return "0x" + digits;
-}
-
 Status check_header(const Header& header, uint64_t actual_bytes, std::span<const std::byte> sealed) {
   if (header.magic != layout::kMagic) return corrupt("header.magic", "not a figurine package");
   if (header.header_checksum != xxh3_64(sealed)) return corrupt("header.header_checksum", "the header is damaged");
   if (header.version != kPackageVersion) {
-    return Status(StatusCode::kUnsupported,
-                  "header.version: is " + std::to_string(header.version) + ", this build reads version " + std::to_string(kPackageVersion));
+    return unsupported("header.version", "is ", header.version, ", this build reads version ", kPackageVersion);
   }
   if (const uint64_t unknown = header.required_features & ~layout::kKnownRequiredFeatures; unknown != 0) {
-    return Status(StatusCode::kUnsupported, "header.required_features: needs features that this build does not know: " + to_hex(unknown));
+    return unsupported("header.required_features", "needs features that this build does not know, as a bit field: ", unknown);
   }
   if (header.kind < uint32_t(PackageKind::kBody) || header.kind > uint32_t(PackageKind::kMotion)) {
-    return Status(StatusCode::kUnsupported,
-                  "header.kind: is " + std::to_string(header.kind) + ", this build knows 1 (body), 2 (avatar), 3 (motion)");
+    return unsupported("header.kind", "is ", header.kind, ", this build knows 1 (body), 2 (avatar), 3 (motion)");
   }
   if (header.file_bytes != actual_bytes) {
-    return corrupt("header.file_bytes",
-                   "the file has " + std::to_string(actual_bytes) + " bytes, its header says " + std::to_string(header.file_bytes));
+    return corrupt("header.file_bytes", "the file has ", actual_bytes, " bytes, its header says ", header.file_bytes);
   }
   if (header.index_offset != kPackageHeaderBytes) return corrupt("header.index_offset", "the index does not follow the header");
   if (header.index_bytes > layout::kMaxIndexBytes) {
-    return Status(StatusCode::kLimitExceeded,
-                  "header.index_bytes: the index is larger than " + std::to_string(layout::kMaxIndexBytes) + " bytes");
+    return over_limit("header.index_bytes", "the index is larger than ", layout::kMaxIndexBytes, " bytes");
   }
   if (header.index_bytes == 0 || header.index_bytes > actual_bytes - kPackageHeaderBytes) {
     return corrupt("header.index_bytes", "the index reaches past the end of the file");
@@ -53,7 +40,7 @@ Status check_header(const Header& header, uint64_t actual_bytes, std::span<const
 
 Status check_zero(std::span<const std::byte> bytes, uint64_t begin, uint64_t end, const std::string& after) {
   for (uint64_t i = begin; i < end; ++i) {
-    if (bytes[i] != std::byte{0}) return corrupt("padding", "the bytes after " + after + " are not zero");
+    if (bytes[i] != std::byte{0}) return corrupt("padding", "the bytes after ", after, " are not zero");
   }
   return {};
 }
@@ -77,7 +64,7 @@ Status read_blob(const schema::Blob& entry, std::span<const std::byte> bytes, co
   blob.info.name = name;
   blob.optional = entry.optional();
   if (entry.type() > schema::ElementType::MAX) {
-    return Status(StatusCode::kUnsupported, blob.info.name + ": element type " + std::to_string(int(entry.type())) + " is unknown");
+    return unsupported(blob.info.name, "element type ", int(entry.type()), " is unknown");
   }
   blob.info.type = static_cast<DataType>(entry.type());
   if (entry.shape()->size() < 1 || entry.shape()->size() > layout::kMaxRank) return corrupt(name, "the shape does not have 1 to 8 lengths");
@@ -89,14 +76,13 @@ Status read_blob(const schema::Blob& entry, std::span<const std::byte> bytes, co
   blob.info.size_bytes = extent.size();
   blob.info.checksum = extent.checksum();
   if (extent.size() != expected_bytes) {
-    return corrupt(name,
-                   "shape and type make " + std::to_string(expected_bytes) + " bytes, the index says " + std::to_string(extent.size()));
+    return corrupt(name, "shape and type make ", expected_bytes, " bytes, the index says ", extent.size());
   }
   if (extent.offset() % kBlobAlignment != 0) return corrupt(name, "does not lie at a multiple of 64 bytes");
   if (extent.offset() > bytes.size() || extent.size() > bytes.size() - extent.offset())
     return corrupt(name, "reaches past the end of the file");
-  if (extent.offset() < cursor) return corrupt(name, "overlaps " + before);
-  if (extent.offset() > layout::align_up(cursor)) return corrupt(name, "leaves a gap after " + before);
+  if (extent.offset() < cursor) return corrupt(name, "overlaps ", before);
+  if (extent.offset() > layout::align_up(cursor)) return corrupt(name, "leaves a gap after ", before);
   FIG_RETURN_IF_ERROR(check_zero(bytes, cursor, extent.offset(), before));
   blob.bytes = bytes.subspan(extent.offset(), extent.size());
   if (extent.checksum() != xxh3_64(blob.bytes)) return corrupt(name, "checksum does not match, the blob is damaged");
@@ -106,16 +92,12 @@ Status read_blob(const schema::Blob& entry, std::span<const std::byte> bytes, co
 
 }  // namespace
 
-Status corrupt(std::string_view field, std::string_view reason) {
-  return Status(StatusCode::kCorrupt, std::string(field) + ": " + std::string(reason));
-}
-
 Result<Container> open_container(std::span<const std::byte> bytes) {
   if (reinterpret_cast<uintptr_t>(bytes.data()) % kBlobAlignment != 0) {
     return Status(StatusCode::kInvalidArgument, "the package's bytes are not 64-byte aligned in memory");
   }
   if (bytes.size() < kPackageHeaderBytes) {
-    return corrupt("header", "the file has " + std::to_string(bytes.size()) + " bytes, a package has at least 64");
+    return corrupt("header", "the file has ", bytes.size(), " bytes, a package has at least 64");
   }
   Container container;
   std::memcpy(&container.header, bytes.data(), sizeof(Header));
@@ -132,8 +114,7 @@ Result<Container> open_container(std::span<const std::byte> bytes) {
   container.content_hash = xxh3_128(bytes.first(size_t{header.index_offset} + header.index_bytes));
 
   const auto& entries = *container.index->blobs();
-  if (entries.size() > layout::kMaxBlobs)
-    return Status(StatusCode::kLimitExceeded, "index.blobs: more than " + std::to_string(layout::kMaxBlobs));
+  if (entries.size() > layout::kMaxBlobs) return over_limit("index.blobs", "more than ", layout::kMaxBlobs);
   container.blobs.resize(entries.size());
   uint64_t cursor = uint64_t{header.index_offset} + header.index_bytes;
   std::string before = "the index";
@@ -143,7 +124,7 @@ Result<Container> open_container(std::span<const std::byte> bytes) {
     before = container.blobs[i].info.name;
     if (!names.insert(container.blobs[i].info.name).second) return corrupt(before, "is there twice");
   }
-  if (bytes.size() != layout::align_up(cursor)) return corrupt("header.file_bytes", "the file does not end after " + before);
+  if (bytes.size() != layout::align_up(cursor)) return corrupt("header.file_bytes", "the file does not end after ", before);
   FIG_RETURN_IF_ERROR(check_zero(bytes, cursor, bytes.size(), before));
   return container;
 }
@@ -158,16 +139,16 @@ Status BlobReader::find(std::string_view name, DataType type, std::initializer_l
   const auto entry = entries_.find(name);
   if (entry == entries_.end()) return presence == kRequired ? corrupt(name, "is missing") : Status();
   const TensorInfo& info = entry->second.blob->info;
-  if (info.type != type) return corrupt(name, std::string("is ") + to_string(info.type) + ", not " + to_string(type));
+  if (info.type != type) return corrupt(name, "is ", to_string(info.type), ", not ", to_string(type));
   bool same = info.shape.size() == shape.size();
   for (size_t i = 0; same && i < shape.size(); ++i) same = shape.begin()[i] == kAny || shape.begin()[i] == info.shape[i];
   if (!same) {
     const auto describe = [](const auto& lengths) {
       std::string text;
-      for (uint32_t length : lengths) text += (text.empty() ? "" : ",") + (length == kAny ? std::string("any") : std::to_string(length));
+      for (uint32_t length : lengths) text += concatenate({text.empty() ? "" : ",", length == kAny ? Word("any") : Word(length)});
       return "[" + text + "]";
     };
-    return corrupt(name, "has shape " + describe(info.shape) + ", expected " + describe(shape));
+    return corrupt(name, "has shape ", describe(info.shape), ", expected ", describe(shape));
   }
   entry->second.asked = true;
   out = entry->second.blob;
@@ -194,7 +175,7 @@ template Status BlobReader::read(std::string_view, std::initializer_list<uint32_
 Status BlobReader::check_all_known() const {
   for (const auto& [name, entry] : entries_) {
     if (!entry.asked && !entry.blob->optional) {
-      return Status(StatusCode::kUnsupported, std::string(name) + ": this build does not know this blob, and it is not optional");
+      return unsupported(name, "this build does not know this blob, and it is not optional");
     }
   }
   return {};

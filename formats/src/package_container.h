@@ -11,6 +11,7 @@
 
 #include "figurine/package.h"
 #include "formats/src/package_layout.h"
+#include "formats/src/refusal.h"
 #include "package_generated.h"
 
 namespace figurine {
@@ -56,8 +57,5 @@ class BlobReader {
   };
   std::map<std::string_view, Entry> entries_;
 };
-
-// "field: reason" as kCorrupt.
-Status corrupt(std::string_view field, std::string_view reason);
 
 }  // namespace figurine

@@ -14,9 +14,9 @@ template <class List, class ReadEntry>
 Status read_list(const List* list, const std::string& field, ReadEntry read_entry) {
   if (list == nullptr) return {};
   if (list->size() > layout::kMaxListEntries) {
-    return Status(StatusCode::kLimitExceeded, field + ": has more than " + std::to_string(layout::kMaxListEntries) + " entries");
+    return over_limit(field, "has more than ", layout::kMaxListEntries, " entries");
   }
-  for (uint32_t i = 0; i < list->size(); ++i) FIG_RETURN_IF_ERROR(read_entry(list->Get(i), field + "[" + std::to_string(i) + "]"));
+  for (uint32_t i = 0; i < list->size(); ++i) FIG_RETURN_IF_ERROR(read_entry(list->Get(i), concatenate({field, "[", i, "]"})));
   return {};
 }
 
@@ -25,8 +25,7 @@ Status read_list(const List* list, const std::string& field, ReadEntry read_entr
 Status read_text(const flatbuffers::String* text, const std::string& field, uint32_t max_bytes, std::string& out, bool allow_lines) {
   out.clear();
   if (text == nullptr) return {};
-  if (text->size() > max_bytes)
-    return Status(StatusCode::kLimitExceeded, field + ": is longer than " + std::to_string(max_bytes) + " bytes");
+  if (text->size() > max_bytes) return over_limit(field, "is longer than ", max_bytes, " bytes");
   if (!is_clean_text(text->string_view(), allow_lines)) return corrupt(field, "is not UTF-8 text without control characters");
   out = text->string_view();
   return {};
@@ -35,15 +34,14 @@ Status read_text(const flatbuffers::String* text, const std::string& field, uint
 Status read_joint_names(const flatbuffers::Vector<flatbuffers::Offset<flatbuffers::String>>& list, const std::string& field,
                         std::vector<std::string>& out) {
   if (list.size() < 1) return corrupt(field, "names no joint");
-  if (list.size() > kMaxJoints)
-    return Status(StatusCode::kLimitExceeded, field + ": names more than " + std::to_string(kMaxJoints) + " joints");
+  if (list.size() > kMaxJoints) return over_limit(field, "names more than ", kMaxJoints, " joints");
   out.resize(list.size());
   std::set<std::string_view> seen;
   for (uint32_t j = 0; j < list.size(); ++j) {
-    const std::string entry = field + "[" + std::to_string(j) + "]";
+    const std::string entry = concatenate({field, "[", j, "]"});
     FIG_RETURN_IF_ERROR(read_text(list.Get(j), entry, layout::kMaxNameBytes, out[j]));
     if (out[j].empty()) return corrupt(entry, "is empty");
-    if (!seen.insert(out[j]).second) return corrupt(entry, "'" + out[j] + "' is there twice");
+    if (!seen.insert(out[j]).second) return corrupt(entry, "'", out[j], "' is there twice");
   }
   return {};
 }
@@ -51,8 +49,8 @@ Status read_joint_names(const flatbuffers::Vector<flatbuffers::Offset<flatbuffer
 Status check_magnitude(std::span<const float> values, const std::string& field, float max) {
   for (size_t i = 0; i < values.size(); ++i) {
     if (std::fabs(values[i]) <= max) continue;
-    if (!std::isfinite(values[i])) return corrupt(field, "value " + std::to_string(i) + " is not finite");
-    return corrupt(field, "value " + std::to_string(i) + " is larger than " + std::to_string(max));
+    if (!std::isfinite(values[i])) return corrupt(field, "value ", i, " is not finite");
+    return corrupt(field, "value ", i, " is larger than ", max);
   }
   return {};
 }
@@ -62,7 +60,7 @@ Status read_conventions(const schema::Conventions& conventions) {
                      conventions.colour_space() == schema::ColourSpace::SrgbEncodedStraightAlpha &&
                      conventions.rotation_format() == schema::RotationFormat::QuaternionWxyz &&
                      conventions.rest_frames() == schema::RestFrames::WorldAligned;
-  return known ? Status() : Status(StatusCode::kUnsupported, "index.conventions: a unit, axis, colour or rotation convention is unknown");
+  return known ? Status() : unsupported("index.conventions", "a unit, axis, colour or rotation convention is unknown");
 }
 
 Status read_provenance(const schema::Provenance& table, Provenance& out) {
@@ -116,8 +114,7 @@ Status read_motion(const schema::Index& index, BlobReader& blobs, Motion& out) {
     double length2 = 0;
     for (size_t k = 0; k < 4; ++k) length2 += double(out.rotations[i + k]) * out.rotations[i + k];
     if (!(std::fabs(std::sqrt(length2) - 1) <= 1e-3)) {
-      return corrupt("motion.rotations",
-                     "frame " + std::to_string(i / 4 / joints) + ", joint " + std::to_string(i / 4 % joints) + ": not a unit quaternion");
+      return corrupt("motion.rotations", "frame ", i / 4 / joints, ", joint ", i / 4 % joints, ": not a unit quaternion");
     }
   }
   return {};

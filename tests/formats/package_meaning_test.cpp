@@ -396,10 +396,9 @@ TEST(PackageFit, AvatarsNameTheirBody) {
 TEST(PackageFit, MotionsHaveTheBodysJoints) {
   const BodySample body;
   MotionSample motion;
-  expect_refused(check_motion_fits_body(motion.motion, body.body), "has 2 joints", StatusCode::kMismatch);
+  expect_refused(check_motion_fits_body(motion.motion, body.body), "it has 2 joints, the body 3", StatusCode::kMismatch);
   motion.motion.joint_names = {"pelvis", "spine1", "jaw"};
-  expect_refused(check_motion_fits_body(motion.motion, body.body), "joint 2 is 'jaw', body 'sample body' has 'head'",
-                 StatusCode::kMismatch);
+  expect_refused(check_motion_fits_body(motion.motion, body.body), "its joint 2 is 'jaw', the body's 'head'", StatusCode::kMismatch);
   motion.motion.joint_names = body.body.joint_names;
   EXPECT_TRUE(check_motion_fits_body(motion.motion, body.body).ok());
 }
