@@ -49,7 +49,9 @@ Header parse_header(const std::string& text, const std::string& where) {
     throw InputError(where + ": type " + type + ": not a plain little-endian array");
   header.type = type.substr(1, type.size() - 2);
   if (header.type.find('O') != std::string::npos) throw InputError(where + ": holds pickled Python objects, which are never read");
-  header.fortran_order = value_of(text, "fortran_order", where) == "True";
+  const std::string order = value_of(text, "fortran_order", where);
+  header.fortran_order = order.starts_with("True");
+  if (!header.fortran_order && !order.starts_with("False")) throw InputError(where + ": header: fortran_order is " + order);
   const std::string shape = value_of(text, "shape", where);
   if (shape.front() != '(') throw InputError(where + ": header: shape is no tuple");
   size_t value = 0;

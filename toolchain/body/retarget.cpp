@@ -32,7 +32,7 @@ struct Source {
   std::vector<Vec3> hips;                     // [F] middle of the hip joints, y up, in the file's unit
   std::array<Vec3, kJointCount> direction{};  // limb bones in the neutral pose; zero: not known
   double leg = 0;                             // thigh + shin, in the file's unit
-  double tolerance_rad = 0;                   // bones that lie nearer than this to the neutral direction are taken as they are
+  double tolerance_rad = 0;                   // arms that lie nearer than this to the neutral direction are taken as they are
 };
 
 // The limb joints whose bone direction is aligned, parents first, and the joint at the bone's far end.
@@ -60,6 +60,7 @@ Vec3 bone(const figurine::Body& body, int from, int to) { return (joint_at(body,
 // A of every joint: turns the body's rest into the source's neutral pose.
 std::array<Quat, kJointCount> alignments(const figurine::Body& body, const Source& source) {
   std::array<Quat, kJointCount> align;
+  std::array<bool, kJointCount> as_it_is{};  // limbs that start in the source's neutral direction keep their whole chain
   for (uint32_t j = 0; j < kJointCount; ++j) {
     const int parent = joint_parents()[j];
     // Fingers go with the hand; trunk, head and feet stand as they stand.
@@ -71,11 +72,13 @@ std::array<Quat, kJointCount> alignments(const figurine::Body& body, const Sourc
       own.y() = wanted.y() = 0;  // about the vertical alone
       align[j] = wanted.norm() > 1e-6 && own.norm() > 1e-6 ? Quat::FromTwoVectors(own, wanted) : Quat::Identity();
     }
+    if (parent >= 0) as_it_is[j] = as_it_is[static_cast<size_t>(parent)];
     for (const Bone& limb : kLimbs) {
-      if (limb.joint != static_cast<int>(j) || source.direction[j].norm() < 1e-6) continue;
+      if (limb.joint != static_cast<int>(j) || source.direction[j].norm() < 1e-6 || as_it_is[j]) continue;
       const Vec3 turned_bone = align[j] * bone(body, limb.joint, limb.end);
       const double angle = std::acos(std::clamp(turned_bone.dot(source.direction[j].normalized()), -1.0, 1.0));
-      if (angle > source.tolerance_rad) align[j] = Quat::FromTwoVectors(turned_bone, source.direction[j]) * align[j];
+      as_it_is[j] = angle < source.tolerance_rad && (j == kLeftShoulder || j == kRightShoulder);
+      if (!as_it_is[j]) align[j] = Quat::FromTwoVectors(turned_bone, source.direction[j]) * align[j];
     }
   }
   return align;

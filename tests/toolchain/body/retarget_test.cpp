@@ -1,0 +1,250 @@
+// Retargeting: a T-pose stays a T-pose, bones keep their direction, the CMU clips walk without broken knees and with feet on the ground.
+#include "toolchain/body/retarget.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "formats/writer/package_writer.h"
+#include "gtest/gtest.h"
+#include "ports/linux/files.h"
+#include "toolchain/body/mannequin.h"
+#include "toolchain/body/test_files.h"
+#include "toolchain/body/texel_body.h"
+
+namespace figurine::body {
+namespace {
+
+using Vec3 = Eigen::Vector3f;
+
+const TexelBody& texels() {
+  static const TexelBody body = make_texel_body(make_mannequin(), 64);
+  return body;
+}
+
+const Bvh& clip_0103() {
+  static const Bvh bvh = read_bvh("/usr/share/assimp/models/BVH/01_03.bvh");
+  return bvh;
+}
+
+// World positions of the joints of one pose.
+std::vector<Vec3> joints_of(const figurine::Body& body, const PoseView& pose) {
+  std::vector<Affine> transforms(kJointCount);
+  skinning_transforms(body.mean_skeleton(), pose, transforms);
+  std::vector<Vec3> out;
+  for (size_t j = 0; j < kJointCount; ++j) {
+    const auto p = transform_point(transforms[j], &body.joint_position_m[3 * j]);
+    out.emplace_back(p[0], p[1], p[2]);
+  }
+  return out;
+}
+
+Vec3 direction(const std::vector<Vec3>& joints, int from, int to) {
+  return (joints[static_cast<size_t>(to)] - joints[static_cast<size_t>(from)]).normalized();
+}
+
+// The neutral frame of CMU's clip twice: what a person standing in a T-pose looks like.
+Bvh t_pose() {
+  Bvh bvh = clip_0103();
+  bvh.values.resize(bvh.channel_count);
+  bvh.values.insert(bvh.values.end(), bvh.values.begin(), bvh.values.begin() + static_cast<std::ptrdiff_t>(bvh.channel_count));
+  bvh.frame_count = 2;
+  return bvh;
+}
+
+TEST(Retarget, TPoseBecomesATPose) {
+  const MotionClip clip = retarget_bvh(t_pose(), texels().view(), {.frames_per_second = 120});
+  ASSERT_EQ(clip.frame_count, 1u);
+  const figurine::Motion motion = clip.view();
+  const std::vector<Vec3> joints = joints_of(texels().view(), motion.pose(0));
+  for (const auto& [from, to, x] : {std::tuple{kLeftShoulder, kLeftElbow, 1.0f},
+                                    {kLeftElbow, kLeftWrist, 1.0f},
+                                    {kLeftWrist, kLeftMiddle1, 1.0f},
+                                    {kRightShoulder, kRightElbow, -1.0f},
+                                    {kRightElbow, kRightWrist, -1.0f}}) {
+    EXPECT_GT(direction(joints, from, to).dot(Vec3(x, 0, 0)), 0.996) << int(from);  // the clip's T-pose droops by 5 degrees
+  }
+  // Palms down: the index lies in front of the pinky, and fingers curl downward.
+  for (int shift : {0, kRightIndex1 - kLeftIndex1}) {
+    const auto at = [&](int j) -> Vec3 { return joints[static_cast<size_t>(j + shift)]; };
+    EXPECT_GT((at(kLeftIndex1) - at(kLeftPinky1)).normalized().z(), 0.95);
+    EXPECT_LT(at(kLeftMiddle1 + 2).y(), at(kLeftMiddle1).y() - 0.01);
+  }
+  // Upright, facing +z, the feet under the hips.
+  EXPECT_GT(direction(joints, kPelvis, kNeck).y(), 0.999);
+  EXPECT_GT(direction(joints, kLeftAnkle, kLeftFoot).z(), 0.85);
+  EXPECT_LT(direction(joints, kLeftHip, kLeftKnee).y(), -0.99);
+}
+
+TEST(Retarget, BonesKeepTheSourcesWorldDirection) {
+  // One elbow of the hierarchy's zero pose bent forward by 40 degrees and the root turned by 90: the forearm points where the source's
+  // points.
+  Bvh bvh = t_pose();
+  std::fill(bvh.values.begin(), bvh.values.end(), 0.0f);
+  float* frame = bvh.values.data();
+  const BvhJoint& hips = bvh.joints[0];
+  const BvhJoint& forearm = bvh.joints[static_cast<size_t>(bvh.find("LeftForeArm"))];
+  frame[hips.first_channel + 4] = 90;      // Yrotation: +z to +x, +x to -z
+  frame[forearm.first_channel + 1] = -40;  // from +x towards +z, before the turn
+  const MotionClip clip = retarget_bvh(bvh, texels().view(), {.frames_per_second = 120, .neutral = Neutral::kZeroPose, .smooth_s = 0});
+  const figurine::Motion motion = clip.view();
+  const std::vector<Vec3> joints = joints_of(texels().view(), motion.pose(0));
+  const float a = 40 * std::numbers::pi_v<float> / 180;
+  EXPECT_GT(direction(joints, kLeftShoulder, kLeftElbow).dot(Vec3(0, 0, -1)), 0.99999);
+  EXPECT_GT(direction(joints, kLeftElbow, kLeftWrist).dot(Vec3(std::sin(a), 0, -std::cos(a))), 0.99999);
+}
+
+struct Walk {
+  uint32_t start, frames;
+};
+
+TEST(Retarget, CmuWalksHaveSoundKneesElbowsAndFeet) {
+  // The walking parts of 01_03, frames of the file at 120 a second.
+  for (const Walk& walk : {Walk{1, 76}, Walk{1473, 50}, Walk{2241, 55}, Walk{3329, 70}}) {
+    RetargetReport report;
+    const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.start = walk.start, .frames = walk.frames}, &report);
+    const figurine::Motion motion = clip.view();
+    float knee = 1e9f, elbow = 1e9f, hands = 1e9f;
+    for (uint32_t f = 0; f < clip.frame_count; ++f) {
+      const std::vector<Vec3> joints = joints_of(texels().view(), motion.pose(f));
+      const Vec3 left = direction(joints, kRightHip, kLeftHip);
+      const Vec3 up = direction(joints, kPelvis, kSpine3), front = left.cross(up);
+      for (int side = 0; side < 2; ++side) {
+        // A shin that turns backwards turns about +left from the thigh; an inverted knee would turn the other way.
+        knee = std::min(
+            knee,
+            direction(joints, kLeftHip + side, kLeftKnee + side).cross(direction(joints, kLeftKnee + side, kLeftAnkle + side)).dot(left));
+        // Forearms bend to the front of the upper arm or hang straight.
+        elbow = std::min(
+            elbow, (direction(joints, kLeftElbow + side, kLeftWrist + side) - direction(joints, kLeftShoulder + side, kLeftElbow + side))
+                       .dot(front));
+        // Wrists stay outside the trunk: an ellipse of 15 x 10 cm around the spine below the chest.
+        const Vec3 wrist = joints[static_cast<size_t>(kLeftWrist + side)] - joints[kSpine1];
+        hands = std::min(hands, Eigen::Vector2f(wrist.dot(left) / 0.15f, wrist.dot(front) / 0.10f).norm());
+      }
+    }
+    std::printf("frames %u + %u: knee %.3f elbow %.3f wrist %.2f; soles %.1f mm mean, lowest %.1f mm; largest step %.1f degrees\n",
+                walk.start, walk.frames, double{knee}, double{elbow}, double{hands}, 1e3 * double{report.mean_contact_m},
+                1e3 * double{report.lowest_sole_m}, 57.3 * double{report.largest_step_rad});
+    EXPECT_GT(knee, -0.03);  // straight legs may read as a degree or two
+    EXPECT_GT(elbow, -0.15);
+    EXPECT_GT(hands, 1);
+    EXPECT_LT(report.mean_contact_m, 0.010);
+    EXPECT_GT(report.lowest_sole_m, -0.03);
+    EXPECT_LT(report.largest_step_rad, 0.6);
+  }
+}
+
+TEST(Retarget, PlantedFeetDoNotSlide) {
+  const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 76});
+  const figurine::Motion motion = clip.view();
+  // Right foot between output frames 18 and 27: mid-stance.
+  const Vec3 before = joints_of(texels().view(), motion.pose(18))[kRightFoot],
+             after = joints_of(texels().view(), motion.pose(27))[kRightFoot];
+  const Vec3 root_before = joints_of(texels().view(), motion.pose(18))[kPelvis],
+             root_after = joints_of(texels().view(), motion.pose(27))[kPelvis];
+  std::printf("stance foot moves %.1f mm while the root moves %.1f mm\n", 1e3 * double{(after - before).norm()},
+              1e3 * double{(root_after - root_before).norm()});
+  EXPECT_LT((after - before).norm(), 0.015);
+  EXPECT_GT((root_after - root_before).norm(), 0.15);
+}
+
+TEST(Retarget, QuaternionsAreUnitAndContinuous) {
+  const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {});
+  EXPECT_EQ(clip.frame_count, 1128u);
+  const size_t stride = size_t{kJointCount} * 4;
+  float worst = 0, dot = 1;
+  for (size_t i = 0; i < clip.rotations.size(); i += 4) {
+    float length = 0, product = 0;
+    for (size_t k = 0; k < 4; ++k) {
+      length += clip.rotations[i + k] * clip.rotations[i + k];
+      if (i >= stride) product += clip.rotations[i + k] * clip.rotations[i + k - stride];
+    }
+    worst = std::max(worst, std::abs(length - 1));
+    if (i >= stride) dot = std::min(dot, product);
+  }
+  EXPECT_LT(worst, 1e-5);
+  EXPECT_GT(dot, 0.9);
+}
+
+TEST(Retarget, RefusesWhatTheClipDoesNotHave) {
+  const auto error = [&](const RetargetOptions& options) {
+    return test::input_error([&] { retarget_bvh(clip_0103(), texels().view(), options); });
+  };
+  EXPECT_NE(error({.start = 99999, .name = "x"}).find("x: start 99999"), std::string::npos);
+  EXPECT_NE(error({.frames = 99999, .name = "x"}).find("x: frames 99999: only 1128"), std::string::npos);
+  Bvh renamed = clip_0103();
+  renamed.joints[static_cast<size_t>(renamed.find("LeftFoot"))].name = "l_foot";
+  EXPECT_NE(test::input_error([&] { retarget_bvh(renamed, texels().view(), {}); }).find("no joint LeftFoot"), std::string::npos);
+}
+
+// AMASS-style files of two frames, all joints in the rest pose but the root.
+std::string amass(const test::TemporaryFolder& folder, size_t columns, const std::string& rate_key = "mocap_frame_rate") {
+  std::vector<double> poses(2 * columns, 0.0);
+  for (size_t f = 0; f < 2; ++f) poses[f * columns] = std::numbers::pi / 2;  // z-up data stands by a turn about x
+  const std::string path = folder / "amass.npz";
+  test::write_npz(path, {{"poses", test::npy_bytes("<f8", {2, columns}, poses)},
+                         {"trans", test::npy_bytes("<f8", {2, 3}, {1, 2, 0.9, 1, 1, 0.9})},
+                         {rate_key, test::npy_bytes("<f8", {}, {30})},
+                         {"betas", test::npy_bytes("<f8", {16}, std::vector<double>(16))}});
+  return path;
+}
+
+TEST(Retarget, ZeroSmplxPoseIsATPoseOnItsFeet) {
+  const test::TemporaryFolder folder;
+  for (size_t columns : {165, 156, 66}) {
+    RetargetReport report;
+    const MotionClip clip = retarget_npz(amass(folder, columns, columns == 66 ? "mocap_framerate" : "mocap_frame_rate"), texels().view(),
+                                         {.smooth_s = 0}, &report);
+    ASSERT_EQ(clip.frame_count, 2u);
+    const figurine::Motion motion = clip.view();
+    const std::vector<Vec3> joints = joints_of(texels().view(), motion.pose(0));
+    EXPECT_GT(direction(joints, kLeftShoulder, kLeftElbow).x(), 0.999);
+    EXPECT_GT(direction(joints, kRightElbow, kRightWrist).dot(Vec3(-1, 0, 0)), 0.999);
+    EXPECT_GT(direction(joints, kPelvis, kHead).y(), 0.99);
+    EXPECT_LT(std::abs(report.lowest_sole_m), 0.002);
+    // One metre along -y of the z-up world is one (scaled) metre along +z.
+    const std::vector<Vec3> later = joints_of(texels().view(), motion.pose(1));
+    EXPECT_NEAR((later[kPelvis] - joints[kPelvis]).z(), report.scale, 1e-4);
+  }
+}
+
+TEST(Retarget, BadNpzIsOneClearLine) {
+  const test::TemporaryFolder folder;
+  EXPECT_NE(test::input_error([&] { retarget_npz(amass(folder, 72), texels().view(), {}); }).find("poses: 72 columns"), std::string::npos);
+  const std::string path = folder / "bad.npz";
+  test::write_npz(path, {{"poses", test::npy_bytes("<f8", {1, 66}, std::vector<double>(66, std::nan("")))},
+                         {"trans", test::npy_bytes("<f8", {1, 3}, {0, 0, 0})},
+                         {"mocap_framerate", test::npy_bytes("<f8", {}, {30})}});
+  EXPECT_NE(test::input_error([&] { retarget_npz(path, texels().view(), {}); }).find("poses: a value is not finite"), std::string::npos);
+}
+
+TEST(MotionClip, SurvivesThePackage) {
+  const test::TemporaryFolder folder;
+  MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.frames = 10, .name = "walk"});
+  const auto bytes = write_package(clip.view(), Provenance{});
+  ASSERT_TRUE(bytes.ok()) << bytes.status().message();
+  ASSERT_TRUE(ports::write_file_atomically(folder / "walk.fgn", *bytes).ok());
+  const MotionClip back = read_motion_clip(folder / "walk.fgn");
+  EXPECT_EQ(back.rotations, clip.rotations);
+  EXPECT_EQ(back.root_translation_m, clip.root_translation_m);
+  EXPECT_EQ(back.name, "walk");
+  EXPECT_NE(test::input_error([&] { read_motion_clip(folder / "none.fgn"); }).find("none.fgn"), std::string::npos);
+}
+
+TEST(MotionClip, TurningTurnsAboutTheVerticalThroughTheRoot) {
+  const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.frames = 20});
+  const OwnedPose pose = clip.pose(13);
+  const float angle = 0.7f;
+  const std::vector<Vec3> before = joints_of(texels().view(), pose.view()), after = joints_of(texels().view(), turned(pose, angle).view());
+  float worst = 0;
+  for (size_t j = 0; j < kJointCount; ++j) {
+    const Vec3 wanted = before[0] + Eigen::AngleAxisf(angle, Vec3::UnitY()) * (before[j] - before[0]);
+    worst = std::max(worst, (after[j] - wanted).norm());
+  }
+  EXPECT_LT(worst, 1e-5);
+}
+
+}  // namespace
+}  // namespace figurine::body

@@ -1,0 +1,81 @@
+// Files that tests make: a temporary folder and .npz archives.
+#pragma once
+
+#include <zip.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include "toolchain/error.h"
+
+namespace figurine::body::test {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "figurine_body_test_XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    path_ = name;
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline void write_text(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+
+// One .npy, version 1.0. type: "<f8", "<f4", "<u4", "<i8"; values are row-major.
+inline std::string npy_bytes(const std::string& type, const std::vector<size_t>& shape, const std::vector<double>& values) {
+  std::string tuple = "(";
+  for (size_t extent : shape) tuple += std::to_string(extent) + ",";
+  std::string header = "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + tuple + "), }";
+  header.resize((header.size() + 1 + 10 + 63) / 64 * 64 - 10, ' ');
+  header.back() = '\n';
+  std::string out("\x93NUMPY\x01\x00", 8);
+  out += static_cast<char>(header.size() & 255);
+  out += static_cast<char>(header.size() >> 8);
+  out += header;
+  const auto append = [&](auto value) { out.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  for (double value : values) {
+    if (type == "<f8") append(value);
+    if (type == "<f4") append(static_cast<float>(value));
+    if (type == "<u4") append(static_cast<uint32_t>(static_cast<int64_t>(value)));
+    if (type == "<i8") append(static_cast<int64_t>(value));
+  }
+  return out;
+}
+
+// name (without .npy) -> bytes of the .npy.
+inline void write_npz(const std::string& path, const std::map<std::string, std::string>& arrays) {
+  int error = 0;
+  zip_t* zip = zip_open(path.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &error);
+  ASSERT_NE(zip, nullptr) << error;
+  for (const auto& [name, bytes] : arrays) {
+    zip_source_t* source = zip_source_buffer(zip, bytes.data(), bytes.size(), 0);
+    const zip_int64_t index = zip_file_add(zip, (name + ".npy").c_str(), source, ZIP_FL_ENC_UTF_8);
+    ASSERT_GE(index, 0);
+    zip_set_file_compression(zip, static_cast<zip_uint64_t>(index), name.size() % 2 ? ZIP_CM_STORE : ZIP_CM_DEFLATE, 1);
+  }
+  ASSERT_EQ(zip_close(zip), 0);
+}
+
+// The message of the InputError that f throws; a failure if it throws none.
+template <class F>
+std::string input_error(F f) {
+  try {
+    f();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no InputError";
+  return "";
+}
+
+}  // namespace figurine::body::test
