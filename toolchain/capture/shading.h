@@ -12,13 +12,13 @@ namespace figurine::capture {
 // Fixed in the world, so that a person's look depends on where they turn. +z is the front, +x the left of a figure at heading 0.
 struct Lighting {
   Vec3 key_direction = normalized({0.52f, 0.74f, 0.62f});  // towards the light
-  Vec3 key_colour{1.22f, 1.12f, 0.97f};                    // irradiance of a surface that faces it, divided by pi
+  Vec3 key_colour{1.12f, 1.02f, 0.88f};                    // irradiance of a surface that faces it, divided by pi
   float key_radius = 0.035f;                               // of the light's disc, seen from the figure: tan of 2 degrees
-  Vec3 sky_colour{0.50f, 0.56f, 0.64f};                    // from straight above
-  Vec3 ground_colour{0.27f, 0.245f, 0.22f};                // from straight below
+  Vec3 sky_colour{0.46f, 0.515f, 0.59f};                   // from straight above
+  Vec3 ground_colour{0.25f, 0.225f, 0.20f};                // from straight below
   float bounce = 0.25f;                                    // what an occluded direction still brings: light that the figure itself reflects
   Vec3 fill_direction = normalized({-0.75f, 0.25f, -0.45f});
-  Vec3 fill_colour{0.12f, 0.14f, 0.18f};  // casts no shadow
+  Vec3 fill_colour{0.11f, 0.13f, 0.165f};  // casts no shadow
 };
 
 inline Vec3 sky_radiance(const Lighting& light, Vec3 direction) {

@@ -48,9 +48,9 @@ std::string skin_texture(const std::string& age, const std::string& ancestry, co
 const std::vector<Garment>& garments_for(bool male) {
   static const std::vector<Garment> kMale = {
       {"male_casualsuit01", {}, {}},
-      {"male_casualsuit02", {{box(248, 50, 324, 122), {0, px(73)}}}, {box(0, 0, 512, 201), box(392, 201, 512, 512)}},
+      {"male_casualsuit02", {{box(248, 52, 324, 120), {0, px(68)}}}, {box(0, 0, 512, 201), box(392, 201, 512, 512)}},
       {"male_casualsuit03", {}, {}},
-      {"male_casualsuit04", {{box(248, 50, 324, 122), {0, px(73)}}}, {box(0, 0, 512, 204)}},
+      {"male_casualsuit04", {{box(248, 52, 324, 120), {0, px(68)}}}, {box(0, 0, 512, 204)}},
       {"male_casualsuit05", {}, {}},
       {"male_casualsuit06", {{box(94, 50, 156, 96), {0, px(50)}}, {box(182, 54, 330, 110), {0, px(62)}}}, {}},
       {"male_elegantsuit01", {}, {}},
@@ -121,8 +121,8 @@ Outfit choose_outfit(const Random& random, const body::MacroShape& shape) {
   outfit.eyes = std::string(kIrises[random.index(kEyes, irises)]) + "_eye.png";
 
   outfit.dye_turn_rad = static_cast<float>(random.uniform(kDyeTurn, -3.14159, 3.14159));
-  outfit.dye_saturation = static_cast<float>(random.uniform(kDyeSaturation, 0.6, 1.05));
-  outfit.dye_value = static_cast<float>(random.uniform(kDyeValue, 0.9, 1.35));
+  outfit.dye_saturation = static_cast<float>(random.uniform(kDyeSaturation, 0.45, 0.85));
+  outfit.dye_value = static_cast<float>(random.uniform(kDyeValue, 0.9, 1.3));
   return outfit;
 }
 
