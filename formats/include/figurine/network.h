@@ -51,7 +51,7 @@ Result<std::vector<ValueShape>> infer_shapes(const Network& network, bool check_
 uint64_t count_macs(const Network& network, const std::vector<ValueShape>& shapes);
 uint64_t count_parameters(const Network& network);
 
-// The pose UNet of DESIGN section 5: four resolutions, C channels, two 3x3 convolutions each on the way down, three up-steps of
+// The pose UNet (docs/numerics.md, "Network"): four resolutions, C channels, two 3x3 convolutions each on the way down, three up-steps of
 // upsample, concat [skip, up], 3x3 2C -> C, 3x3 C -> C, and a 1x1 head. 15 convolutions; weights are left empty.
 Network make_pose_unet(uint32_t uv_size, uint32_t input_channels, uint32_t channels, uint32_t output_channels);
 
