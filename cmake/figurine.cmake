@@ -21,7 +21,8 @@ endif()
 # One arithmetic on every CPU: no fused multiply-add behind the code's back (docs/numerics.md, "Same pixels").
 add_compile_options(-ffp-contract=off -Wall -Wextra -Wshadow -Wno-missing-field-initializers)
 if(FIGURINE_SANITIZE)
-  add_compile_options(-fsanitize=${FIGURINE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  # -O1: half the build time, better stacks, and the checks are the same.
+  add_compile_options(-O1 -fsanitize=${FIGURINE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${FIGURINE_SANITIZE})
 endif()
 if(FIGURINE_SCALAR)
