@@ -133,7 +133,7 @@ Status run_render(const RenderOptions& options) {
     if (sheet) json["contact_sheet"] = options.contact_sheet;
     json["frames"] = frame_count;
     json["size"] = {size.width_px, size.height_px};
-    json["camera"] = camera_json(cameras->front());  // of the first frame
+    json["camera"] = camera_json(cameras->front());                            // of the first frame
     json["frames_per_second"] = 1000 / std::max(log.total_ms().median, 1e-6);  // of rendering, by the median frame
     json["frames_per_second_with_output"] = frame_count / std::max(wall_s, 1e-9);
     json["stages_ms"] = log.stages_json();
