@@ -6,6 +6,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "ports/linux/files.h"
+#include "toolchain/body/motion_loop.h"
 #include "toolchain/body/retarget.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
@@ -23,6 +24,8 @@ struct MotionOptions {
   uint32_t frames = 0;
   std::string neutral = "first";
   std::string up = "z";
+  uint32_t loop_cycles = 0;
+  bool in_place = false;
 };
 
 constexpr const char* kCmuSource =
@@ -53,6 +56,13 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
     throw InputError(options.clip + ": unsupported: .glb animations are not read by this version; use .bvh or .npz");
   } else {
     throw InputError(options.clip + ": unsupported: the name must end in .bvh or .npz");
+  }
+
+  if (options.loop_cycles > 0) {
+    body::LoopReport loop;
+    clip = body::make_loop(clip, {.cycles = options.loop_cycles, .in_place = options.in_place}, &loop);
+    std::printf("cycle of %u frames from frame %u of the result, gap %.1f degrees\n", loop.length, loop.first_frame,
+                57.29578 * double{loop.gap_rad});
   }
 
   Provenance provenance;
@@ -99,6 +109,9 @@ void add_motion_command(CLI::App& app) {
   command->add_option("--neutral", options->neutral, "BVH: the T-pose is the first frame or the zero pose")
       ->check(CLI::IsMember({"first", "zero"}));
   command->add_option("--up", options->up, "NPZ: the world's up axis")->check(CLI::IsMember({"z", "y"}));
+  CLI::Option* loop = command->add_option("--loop", options->loop_cycles, "Repeat the best gait cycle this often, straight ahead")
+                          ->check(CLI::Range(1u, 1000u));
+  command->add_flag("--in-place", options->in_place, "With --loop: walk on the spot")->needs(loop);
   command->add_option("--source", options->source, "Provenance line: where the clip is from and under which terms");
   command->callback([options, start, frames] { run_motion(*options, start->count() > 0, frames->count() > 0); });
 }

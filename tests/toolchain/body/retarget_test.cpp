@@ -10,6 +10,7 @@
 #include "gtest/gtest.h"
 #include "ports/linux/files.h"
 #include "toolchain/body/mannequin.h"
+#include "toolchain/body/motion_loop.h"
 #include "toolchain/body/test_files.h"
 #include "toolchain/body/texel_body.h"
 
@@ -219,6 +220,57 @@ TEST(Retarget, BadNpzIsOneClearLine) {
                          {"trans", test::npy_bytes("<f8", {1, 3}, {0, 0, 0})},
                          {"mocap_framerate", test::npy_bytes("<f8", {}, {30})}});
   EXPECT_NE(test::input_error([&] { retarget_npz(path, texels().view(), {}); }).find("poses: a value is not finite"), std::string::npos);
+}
+
+float largest_step(const MotionClip& clip, uint32_t from, uint32_t to) {
+  float step = 0;
+  for (size_t j = 0; j < kJointCount; ++j) {
+    const auto rotation = [&](uint32_t f) {
+      const float* q = &clip.rotations[(size_t{f} * kJointCount + j) * 4];
+      return Eigen::Quaternionf(q[0], q[1], q[2], q[3]);
+    };
+    step = std::max(step, rotation(from).angularDistance(rotation(to)));
+  }
+  return step;
+}
+
+TEST(MotionLoop, RepeatsWithoutASeamAndWalksStraight) {
+  const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 76});
+  LoopReport report;
+  const MotionClip loop = make_loop(clip, {.cycles = 3}, &report);
+  const uint32_t length = report.length;
+  ASSERT_EQ(loop.frame_count, 3 * length);
+  std::printf("cycle of %u frames, gap %.1f degrees\n", length, 57.3 * double{report.gap_rad});
+  EXPECT_LT(report.gap_rad, 0.2);
+  // The same pose a cycle later, and the seam is no larger a step than the gait's own.
+  float within = 0;
+  for (uint32_t f = 0; f + 1 < length; ++f) {
+    within = std::max(within, largest_step(loop, f, f + 1));
+    EXPECT_LT(largest_step(loop, f, f + length), 2e-3) << f;
+  }
+  EXPECT_LT(largest_step(loop, length - 1, length), within);
+  EXPECT_LT(largest_step(loop, loop.frame_count - 1, 0), within);
+  // Straight along +z at a walking pace, hips swaying.
+  const float pace = (loop.root_translation_m[3 * size_t{length} + 2] - loop.root_translation_m[2]) / (static_cast<float>(length) / 30);
+  EXPECT_GT(pace, 0.7);
+  EXPECT_LT(pace, 1.6);
+  for (uint32_t f = 0; f < loop.frame_count; ++f) {
+    const float* q = &loop.rotations[size_t{f} * kJointCount * 4];
+    EXPECT_LT(std::abs(std::atan2(2 * (q[1] * q[3] + q[0] * q[2]), 1 - 2 * (q[1] * q[1] + q[2] * q[2]))), 0.2) << f;
+    EXPECT_LT(std::abs(loop.root_translation_m[size_t{f} * 3]), 0.08);
+  }
+}
+
+TEST(MotionLoop, InPlaceStaysInPlace) {
+  const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 76});
+  const MotionClip loop = make_loop(clip, {.cycles = 2, .in_place = true});
+  for (size_t i = 0; i < loop.root_translation_m.size(); ++i) {
+    if (i % 3 != 1) {
+      EXPECT_LT(std::abs(loop.root_translation_m[i]), 0.08);
+    }
+  }
+  const MotionClip short_clip = retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 20, .name = "short"});
+  EXPECT_NE(test::input_error([&] { make_loop(short_clip, {}); }).find("short: loop: 20 frames are too few"), std::string::npos);
 }
 
 TEST(MotionClip, SurvivesThePackage) {
