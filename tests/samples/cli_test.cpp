@@ -383,8 +383,8 @@ TEST_F(Cli, AFullDiskLeavesNothing) {
 TEST_F(Cli, AnInterruptLeavesNothing) {
   for (const char* output : {"x.y4m", "x_%04d.png"}) {
     // Long enough to be interrupted: the same twelve frames at a size that takes seconds.
-    const ProgramRun result = run("render P/avatar.fgn --motion P/motion.fgn --size 4000x4000 --threads 1 -o " + std::string(output),
-                                  {.before = "timeout -s INT 1"});
+    const ProgramRun result = run("render P/avatar.fgn --motion P/motion.fgn --size 3000x3000 --threads 1 -o " + std::string(output),
+                                  {.before = "timeout -s INT 0.7"});
     EXPECT_NE(result.exit_code, 0);
     EXPECT_NE(result.exit_code, 1);
     EXPECT_TRUE(folder_.names().empty()) << folder_.names().front();
