@@ -68,7 +68,7 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
                                const c10::intrusive_ptr<UNetPlan>& plan) {
     const std::vector<Layer>& layers = plan->network.layers;
     std::vector<torch::Tensor> values(layers.size() + 1), extra(layers.size());
-    values[0] = input.permute({2, 0, 1}).unsqueeze(0).to(plan->type_of(0));  // NHWC in memory, seen as NCHW channels-last
+    values[0] = as_channels_last(input).to(plan->type_of(0));
     for (size_t i = 0; i < layers.size(); ++i) {
       const torch::Tensor& a = values[layers[i].inputs[0]];
       torch::Tensor& out = values[i + 1];
@@ -108,7 +108,7 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
     const std::vector<Layer>& layers = plan->network.layers;
     torch::Tensor flat = torch::empty({plan->parameters});
     std::vector<torch::Tensor> gradients(layers.size() + 1);
-    gradients.back() = output_gradients[0].permute({2, 0, 1}).unsqueeze(0);
+    gradients.back() = as_channels_last(output_gradients[0].contiguous());
     // A value that several layers read gets the sum of their gradients; the layers run in reverse, so it is complete when its own layer
     // comes.
     const auto give = [&](uint32_t value, torch::Tensor gradient) {
@@ -130,11 +130,11 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
           const bool to_input = layer.inputs[0] != 0;
           const int64_t bias_size = slot.out;
           auto [d_input, d_kernel, d_bias] =
-              at::convolution_backward(gradient.to(type), a.to(type), extra[i], at::IntArrayRef(bias_size), {1, 1}, padding(slot), {1, 1},
-                                       false, {0, 0}, 1, {to_input, true, true});
+              at::convolution_backward(batched(gradient.to(type), slot), batched(a.to(type), slot), extra[i], at::IntArrayRef(bias_size),
+                                       {1, 1}, padding(slot), {1, 1}, false, {0, 0}, 1, {to_input, true, true});
           UNetPlan::kernel_of(flat, slot).copy_(d_kernel);
           UNetPlan::bias_of(flat, slot).copy_(d_bias);
-          if (to_input) give(layer.inputs[0], d_input.to(a.scalar_type()));
+          if (to_input) give(layer.inputs[0], unbatched(d_input, a).to(a.scalar_type()));
           break;
         }
         case LayerOp::kMaxPool2:
@@ -155,6 +155,22 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
   }
 
  private:
+  // [T,T,C] seen as [1,C,T,T] in channels-last strides. By view and permute: unsqueeze would give the batch a stride that is not recognised
+  // as channels-last, and the convolutions would take their slow path.
+  static torch::Tensor as_channels_last(const torch::Tensor& t) {
+    return t.view({1, t.size(0), t.size(1), t.size(2)}).permute({0, 3, 1, 2});
+  }
+  // A 1x1 convolution sees its pixels as a batch of 16: for batch 1 on one thread LibTorch would leave oneDNN for a BLAS call.
+  static torch::Tensor batched(const torch::Tensor& t, const ConvolutionSlot& slot) {
+    constexpr int64_t kBatch = 16;
+    const int64_t channels = t.size(1), height = t.size(2), width = t.size(3);
+    if (slot.kernel != 1 || height % kBatch != 0) return t;
+    return t.permute({0, 2, 3, 1}).reshape({kBatch, height / kBatch, width, channels}).permute({0, 3, 1, 2});
+  }
+  static torch::Tensor unbatched(const torch::Tensor& t, const torch::Tensor& like) {
+    if (t.size(0) == 1) return t;
+    return t.permute({0, 2, 3, 1}).reshape({1, like.size(2), like.size(3), t.size(1)}).permute({0, 3, 1, 2});
+  }
   static std::vector<int64_t> padding(const ConvolutionSlot& slot) { return {slot.kernel / 2, slot.kernel / 2}; }
 };
 
