@@ -162,6 +162,7 @@ int Bvh::find(const std::string& joint_name) const {
 Bvh parse_bvh(std::string_view text, const std::string& where) {
   Scanner in(text, where);
   Bvh bvh;
+  bvh.where = where;
   parse_hierarchy(in, bvh);
   parse_motion(in, bvh);
   return bvh;

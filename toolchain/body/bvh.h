@@ -24,6 +24,7 @@ struct BvhJoint {
 };
 
 struct Bvh {
+  std::string where;  // the file, for messages
   std::vector<BvhJoint> joints;
   uint32_t frame_count = 0;
   double frame_time_s = 0;

@@ -30,8 +30,8 @@ OwnedPose MotionClip::pose(uint32_t frame) const {
 }
 
 MotionClip read_motion_clip(const std::string& path) {
-  const ports::MappedFile file = value_or_throw(ports::MappedFile::open(path), path);
-  const Package package = value_or_throw(Package::open(file.bytes(), path), path);
+  const ports::MappedFile file = value_or_throw(ports::MappedFile::open(path), "motion");
+  const Package package = value_or_throw(Package::open(file.bytes(), path), "motion");
   if (package.kind() != PackageKind::kMotion) throw InputError(path + ": a " + to_string(package.kind()) + " package, not a motion");
   const Motion& motion = package.motion();
   if (motion.joint_names != joint_names()) throw InputError(path + ": joint_names: not the 55 joints of SMPL-X");

@@ -84,11 +84,12 @@ std::array<Quat, kJointCount> alignments(const figurine::Body& body, const Sourc
   return align;
 }
 
-// How far each finger joint bends beyond the rest pose so that the hand looks at rest: local rotations of the finger joints.
+// How far each finger joint bends beyond the rest pose, and how far the fingers close, so that the hand looks at rest: local rotations.
 std::array<Quat, kJointCount> relaxed_fingers(const figurine::Body& body) {
   std::array<Quat, kJointCount> curl;
   curl.fill(Quat::Identity());
-  constexpr double kFingerBend[3] = {22 * kDegree, 28 * kDegree, 18 * kDegree};
+  constexpr double kFingerBend[3] = {25 * kDegree, 35 * kDegree, 24 * kDegree};
+  constexpr double kSplayKept = 0.3;  // fingers of a template are spread for the skinner's sake
   for (int side = 0; side < 2; ++side) {
     const int shift = side * (kRightIndex1 - kLeftIndex1);
     const int wrist = kLeftWrist + side;
@@ -105,6 +106,10 @@ std::array<Quat, kJointCount> relaxed_fingers(const figurine::Body& body) {
             Quat(Eigen::AngleAxisd(std::clamp(kFingerBend[i] - bent, 0.0, kFingerBend[i]), hinge));
         before = own;
       }
+      const Vec3 own = bone(body, first + shift, first + shift + 1);
+      const double splay = std::atan2(along.cross(own).dot(palm), along.dot(own));
+      curl[static_cast<size_t>(first + shift)] =
+          curl[static_cast<size_t>(first + shift)] * Quat(Eigen::AngleAxisd((kSplayKept - 1) * splay, palm));
       curl[static_cast<size_t>(first + shift + 2)] = Quat(Eigen::AngleAxisd(0.5 * kFingerBend[2], hinge));
     }
   }
@@ -368,7 +373,7 @@ size_t joint_index(const Bvh& bvh, const char* name, const std::string& where) {
 }  // namespace
 
 MotionClip retarget_bvh(const Bvh& bvh, const figurine::Body& body, const RetargetOptions& options, RetargetReport* report) {
-  const std::string where = options.name.empty() ? "motion" : options.name;
+  const std::string& where = bvh.where;
   Source source;
   source.where = where;
   source.frames_per_second = 1 / bvh.frame_time_s;

