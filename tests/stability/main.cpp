@@ -43,6 +43,21 @@ std::string date() {
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(std::to_string(value)); }
 
+// One line a row: a table to read and to compare.
+std::string layout(const Json& report) {
+  std::string text = "{\n";
+  for (const auto& [key, value] : report.items()) {
+    if (key != "rows") text += " " + Json(key).dump() + ": " + value.dump() + ",\n";
+  }
+  text += " \"rows\": [";
+  const char* separator = "\n  ";
+  for (const Json& row : report["rows"]) {
+    text += separator + row.dump();
+    separator = ",\n  ";
+  }
+  return text + "\n ]\n}\n";
+}
+
 int run(const std::string& output) {
   Json report{{"command", "figurine-stability -o docs/results/stability.json"},
               {"commit", first_line_of("git -c safe.directory='*' -C '" FIGURINE_SOURCE_DIR "' rev-parse --short=12 HEAD 2> /dev/null")},
@@ -66,7 +81,7 @@ int run(const std::string& output) {
       }
     }
   }
-  std::string text = report.dump(1) + "\n";
+  std::string text = layout(report);
   if (output.empty()) {
     std::cout << text;
   } else if (const Status status = ports::write_file_atomically(output, std::as_bytes(std::span(text))); !status.ok()) {
