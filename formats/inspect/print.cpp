@@ -131,7 +131,7 @@ void print_provenance(Page& page, const Json& provenance) {
   page.line("quality", quality);
   page.line("authors", joined(provenance["authors"], ", "));
   page.heading("licence");
-  page.line("name", text_of(provenance["licence_name"]));
+  page.line("name", provenance["licence_name"] == "" ? "not stated" : text_of(provenance["licence_name"]));
   page.line("url", text_of(provenance["licence_url"]));
   page.line("who may perform", text_of(provenance["avatar_permission"]));
   page.line("commercial usage", text_of(provenance["commercial_usage"]));

@@ -2,8 +2,10 @@
 // ones.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -24,15 +26,28 @@ std::string read_text(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+// A folder of this process, gone when it ends.
+const std::string& scratch() {
+  struct Folder {
+    Folder() : path(testing::TempDir() + "figurine_inspect_test_" + std::to_string(getpid()) + "/") {
+      std::filesystem::create_directories(path);
+    }
+    ~Folder() { std::filesystem::remove_all(path); }
+    std::string path;
+  };
+  static const Folder folder;
+  return folder.path;
+}
+
 std::string write_bytes(const std::string& name, const std::vector<std::byte>& bytes) {
-  const std::string path = testing::TempDir() + "figurine_inspect_" + name;
+  const std::string path = scratch() + name;
   std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
   return path;
 }
 
 // In the golden folder, so that paths in the output are short and the same everywhere.
 Outcome inspect(const std::string& arguments) {
-  const std::string out = testing::TempDir() + "figurine_inspect_out", err = testing::TempDir() + "figurine_inspect_err";
+  const std::string out = scratch() + "out", err = scratch() + "err";
   const int status =
       std::system(("cd '" + kGolden + "' && '" FIGURINE_INSPECT "' " + arguments + " > '" + out + "' 2> '" + err + "'").c_str());
   return {.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1, .out = read_text(out), .err = read_text(err)};
