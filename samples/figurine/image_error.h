@@ -1,4 +1,4 @@
-// How far one picture is from another, as docs/numerics.md ("Honest numbers") defines it.
+// How far one picture is from another, as docs/numerics.md ("Picture quality") defines it.
 #pragma once
 
 #include <cstdint>
