@@ -33,7 +33,7 @@ struct Body {
   std::span<const float> texel_position_m;     // [N,3]
   std::span<const float> texel_normal;         // [N,3] unit
   std::span<const uint8_t> texel_joints;       // [N,K]
-  std::span<const float> texel_weights;        // [N,K] >= 0, sum 1 within 1e-5
+  std::span<const float> texel_weights;        // [N,K] >= 0, sum 1 within 1e-4
   std::span<const float> texel_spacing_m;      // [N] distance to the neighbouring texels on the surface, > 0
   std::span<const float> texel_shape_basis_m;  // [S,N,3]
 
