@@ -40,9 +40,9 @@ struct Session {
   }
 };
 
-// Lowers or lifts every pose until its lowest point touches y = 0, so that jumps do not cost image height, and returns where the figure
-// then reaches in any of its poses.
-std::vector<Vec3> stand_on_ground(Session& session, const Body& body) {
+// Moves every pose until its lowest point touches y = 0 and the middle of its outline stands over the origin, so that neither jumps nor
+// leaning cost image size, and returns where the figure then reaches in any of its poses.
+std::vector<Vec3> place_poses(Session& session, const Body& body) {
   std::vector<float> position, weights;
   std::vector<uint8_t> joints;
   for (const Mesh& mesh : session.person.meshes) {
@@ -55,10 +55,15 @@ std::vector<Vec3> stand_on_ground(Session& session, const Body& body) {
   std::vector<Vec3> points;
   for (size_t f = 0; f < session.sequence.size(); ++f) {
     const std::vector<float> posed = body::skin_positions(position, joints, weights, session.transforms(f, body));
-    float lowest = posed[1];
-    for (size_t i = 1; i < posed.size(); i += 3) lowest = std::min(lowest, posed[i]);
-    session.sequence[f].pose.root_translation_m[1] -= lowest;
-    for (size_t i = 0; i < posed.size(); i += 3) points.push_back(load(&posed[i]) - Vec3{0, lowest, 0});
+    Vec3 low = load(posed.data()), high = low;
+    for (size_t i = 0; i < posed.size(); i += 3) {
+      low = {std::min(low.x, posed[i]), std::min(low.y, posed[i + 1]), std::min(low.z, posed[i + 2])};
+      high = {std::max(high.x, posed[i]), std::max(high.y, posed[i + 1]), std::max(high.z, posed[i + 2])};
+    }
+    const Vec3 shift{-(low.x + high.x) / 2, -low.y, -(low.z + high.z) / 2};
+    std::array<float, 3>& translation = session.sequence[f].pose.root_translation_m;
+    translation = {translation[0] + shift.x, translation[1] + shift.y, translation[2] + shift.z};
+    for (size_t i = 0; i < posed.size(); i += 3) points.push_back(load(&posed[i]) + shift);
   }
   return points;
 }
@@ -76,7 +81,7 @@ Session prepare(const CaptureRequest& request, uint32_t identity, const Package&
   shape_body(body, session.person.shape, session.joints_m, texels);
   const std::array<float, 3> root{session.joints_m[0], session.joints_m[1], session.joints_m[2]};
   session.sequence = make_sequence(motions, {.frames = request.frames, .seed = person.seed, .root_rest_m = root});
-  session.rig = make_rig(request.rig, stand_on_ground(session, body));
+  session.rig = make_rig(request.rig, place_poses(session, body));
   session.record = {.identity = identity,
                     .seed = request.seed,
                     .tool = request.tool,

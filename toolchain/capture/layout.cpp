@@ -1,9 +1,14 @@
 #include "toolchain/capture/layout.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <bit>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 
 #include "ports/linux/files.h"
@@ -37,6 +42,36 @@ ordered_json decimals(const Range& values) {
 
 void write_bytes(const std::string& path, std::span<const std::byte> bytes) {
   throw_if_error(ports::write_file_atomically(path, bytes), "-o");
+}
+
+// Whole or not at all, but not synced one by one: thousands of images would spend their time waiting for the disk. finish() syncs them
+// together, before figurine.json calls the capture complete.
+void write_unsynced(const std::string& path, std::span<const std::byte> bytes) {
+  const std::string temporary = path + ".tmp";
+  std::FILE* file = std::fopen(temporary.c_str(), "wb");
+  if (file == nullptr) throw InputError(temporary + ": " + std::strerror(errno));
+  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+  const int write_error = errno;
+  const bool closed = std::fclose(file) == 0;
+  if (written && closed && std::rename(temporary.c_str(), path.c_str()) == 0) return;
+  const std::string reason = std::strerror(written ? errno : write_error);
+  std::remove(temporary.c_str());
+  throw InputError(path + ": " + reason);
+}
+
+void sync_file_system_of(const std::string& directory) {
+  const int folder = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool synced = folder >= 0 && ::syncfs(folder) == 0;
+  const std::string reason = std::strerror(errno);
+  if (folder >= 0) ::close(folder);
+  if (!synced) throw InputError(directory + ": " + reason);
+}
+
+// A file that is there and not empty: what a crash may leave of an image that was not synced is empty.
+bool has_content(const std::string& path) {
+  std::error_code error;
+  const auto size = fs::file_size(path, error);
+  return !error && size > 0;
 }
 
 // Axis times angle, the angle in [0, pi].
@@ -203,24 +238,25 @@ void IdentityLayout::begin(bool resume) {
   std::vector<float> shape;
   for (const ordered_json& s : about_["shape"]) shape.push_back(s.get<float>());
   for (size_t f = 0; f < sequence_.size(); ++f) {
-    write_json(directory_ + "/smplx/smpl/" + numbered("%06u.json", static_cast<uint32_t>(f)),
-               ordered_json::array({smplx_person(sequence_[f], shape, root_rest_m_)}));
+    const std::string text = ordered_json::array({smplx_person(sequence_[f], shape, root_rest_m_)}).dump() + "\n";
+    write_unsynced(directory_ + "/smplx/smpl/" + numbered("%06u.json", static_cast<uint32_t>(f)), std::as_bytes(std::span(text)));
   }
   write_json(about_path, about_);
 }
 
 bool IdentityLayout::has_image(size_t frame, size_t camera) const {
-  return fs::exists(mask_path(frame, camera)) && fs::exists(image_path(frame, camera));
+  return has_content(mask_path(frame, camera)) && has_content(image_path(frame, camera));
 }
 
 void IdentityLayout::write_image(size_t frame, size_t camera, const Rendering& rendering) const {
-  write_bytes(image_path(frame, camera), dataset::encode_jpeg(rendering.colour, kJpegQuality));
-  write_bytes(mask_path(frame, camera), value_or_throw(ports::encode_png(rendering.alpha), mask_path(frame, camera)));
+  write_unsynced(image_path(frame, camera), dataset::encode_jpeg(rendering.colour, kJpegQuality));
+  write_unsynced(mask_path(frame, camera), value_or_throw(ports::encode_png(rendering.alpha), mask_path(frame, camera)));
 }
 
 void IdentityLayout::finish() const {
   ordered_json about = about_;
   about["complete"] = true;
+  sync_file_system_of(directory_);
   write_json(directory_ + "/figurine.json", about);
 }
 

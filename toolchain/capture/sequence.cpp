@@ -10,7 +10,9 @@
 namespace figurine::capture {
 namespace {
 
-constexpr double kGoldenRatio = 0.6180339887498949;
+// Turns from one pose to the next. Not the golden ratio: its multiples of 13 nearly close the circle, so every 13th pose (the held-out
+// ones) would face the same way; 13 times this one does not.
+constexpr double kHeadingStep = 0.4142135623730950;  // sqrt(2) - 1
 constexpr uint64_t kHeadingStream = 3;
 
 }  // namespace
@@ -36,7 +38,7 @@ std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& mot
     const bool in_block = split.frames[i] == dataset::FrameSplit::kBlock;
     uint32_t at = options.frames > 1 ? static_cast<uint32_t>(uint64_t{i} * (length - 1) / (options.frames - 1)) : 0;
     if (in_block) {
-      if (!after_block) block_heading = start + i * kGoldenRatio;
+      if (!after_block) block_heading = start + i * kHeadingStep;
       after_block = true;
       at += distance;
     } else if (after_block) {
@@ -49,7 +51,7 @@ std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& mot
     captured.split = split.frames[i];
     captured.motion = motions[clip].name;
     captured.motion_frame = at;
-    const double turns = in_block ? block_heading : start + i * kGoldenRatio;
+    const double turns = in_block ? block_heading : start + i * kHeadingStep;
     captured.heading_rad = static_cast<float>((turns - std::floor(turns)) * 2 * std::numbers::pi);
     captured.pose = body::turned(motions[clip].pose(at), captured.heading_rad);
     captured.pose.root_translation_m[0] = -options.root_rest_m[0];

@@ -30,8 +30,8 @@ struct SequenceOptions {
 };
 
 // The motions are laid end to end and sampled evenly; dataset::default_split says what is held out. Every pose outside the block gets its
-// own heading (golden-ratio steps: any run of poses covers the circle); the block keeps one, so that it is a piece of real motion.
-// InputError if the motions have fewer frames than asked for.
+// own heading (irrational steps: any run of poses covers the circle, and so do the held-out ones); the block keeps one, so that it is a
+// piece of real motion. InputError if the motions have fewer frames than asked for.
 std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& motions, const SequenceOptions& options);
 
 }  // namespace figurine::capture

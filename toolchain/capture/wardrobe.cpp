@@ -121,7 +121,7 @@ Outfit choose_outfit(const Random& random, const body::MacroShape& shape) {
   outfit.eyes = std::string(kIrises[random.index(kEyes, irises)]) + "_eye.png";
 
   outfit.dye_turn_rad = static_cast<float>(random.uniform(kDyeTurn, -3.14159, 3.14159));
-  outfit.dye_saturation = static_cast<float>(random.uniform(kDyeSaturation, 0.45, 0.85));
+  outfit.dye_saturation = static_cast<float>(random.uniform(kDyeSaturation, 0.4, 0.75));
   outfit.dye_value = static_cast<float>(random.uniform(kDyeValue, 0.9, 1.3));
   return outfit;
 }
