@@ -28,9 +28,10 @@ struct MotionOptions {
   bool in_place = false;
 };
 
+// The sentence that the database's authors ask for.
 constexpr const char* kCmuSource =
-    "CMU Graphics Lab Motion Capture Database, BVH conversion by B. Hahne: free for research and commercial use; created with funding from "
-    "NSF EIA-0196217";
+    "BVH conversion by B. Hahne, free for research and commercial use. The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "The database was created with funding from NSF EIA-0196217.";
 
 void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), "--body");
@@ -69,7 +70,9 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   provenance.tool = "figurine-train " FIGURINE_VERSION;
   provenance.settings = {{"command", "motion " + path.filename().string()},
                          {"body", format_hash(package.content_hash())},
-                         {"start", std::to_string(retarget.start.value_or(0))},
+                         {"start", has_start ? std::to_string(options.start) : "first of the motion"},
+                         {"frames", std::to_string(clip.frame_count)},
+                         {"loop_cycles", std::to_string(options.loop_cycles)},
                          {"smooth_s", std::to_string(retarget.smooth_s)}};
   if (!options.source.empty()) {
     provenance.sources = {options.source};
