@@ -32,11 +32,11 @@ inline float round_small(float x) {
 // 2^n for integers -126 <= n <= 127.
 inline float power_of_two(float n) { return std::bit_cast<float>((static_cast<int32_t>(n) + 127) << 23); }
 
-// 2^x for x <= 126; everything below -126 counts as -126, so that no denormal appears. Not for NaN. Largest error 1.1e-7.
-inline float exp2_nonpositive(float x) {
-  x = x > -126.0f ? x : -126.0f;
+// 2^-x for x >= 0; everything above 126 counts as 126, so that no denormal appears. Not for NaN. Largest error 1.1e-7.
+inline float exp2_minus(float x) {
+  x = x < 126.0f ? x : 126.0f;
   const float n = round_small(x);
-  return exp2_fraction(x - n) * power_of_two(n);
+  return exp2_fraction(n - x) * std::bit_cast<float>((127 - static_cast<int32_t>(n)) << 23);
 }
 
 // e^x for all floats: 0 below the normal range, inf above it, NaN for NaN. Largest error 1.3e-7.

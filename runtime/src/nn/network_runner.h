@@ -1,4 +1,4 @@
-// Evaluates a figurine::Network in f32 through XNNPACK's subgraph API. NHWC, batch 1. Based on nothing but the definitions in
+// Evaluates a figurine::Network in f32 through XNNPACK's subgraph API. NHWC, batch 1. The definitions are those of
 // figurine/network.h.
 //
 // Everything is packed, planned and pointed at fixed buffers once; run() then allocates nothing. Layers whose output nobody needs are not

@@ -32,8 +32,8 @@ struct GaussianArrays {
 
 class PosedAvatar {
  public:
-  // The arrays behind avatar and body are borrowed and must outlive the object. Errors: kCorrupt if the network does not fit the maps or the decoding;
-  // kInvalidArgument; those of NetworkRunner::create; kOutOfMemory.
+  // The arrays behind avatar and body are borrowed and must outlive the object. Errors: kCorrupt if the network does not fit the maps or
+  // the decoding; kInvalidArgument; those of NetworkRunner::create; kOutOfMemory.
   static Result<std::unique_ptr<PosedAvatar>> create(const Avatar& avatar, const Body& body, ThreadPool& pool);
 
   const Body& body() const { return body_; }

@@ -1,7 +1,8 @@
 // A stable radix sort of float depths: ascending, equal depths keep their input order.
 //
-// All 32 bits of the float count: integer or normalised depths lose neighbours and show as popping. Based on: the least-significant-digit
-// radix sort, Knuth, The Art of Computer Programming 3, 5.2.5; positive floats order as their bits do.
+// All 32 bits of the float count: integer or normalised depths lose neighbours and show as popping.
+//
+// Based on: Knuth, The Art of Computer Programming 3, 5.2.5 (least-significant-digit radix sort); positive floats order as their bits do.
 #pragma once
 
 #include <array>

@@ -112,8 +112,7 @@ void Rasterizer::fill_pairs(const TileRange& band) {
 
 void Rasterizer::blend_tile(uint32_t index, const ImageTarget& target, const std::optional<std::array<float, 3>>& background,
                             StageClock& clock) {
-  kernels::Pixel pixels[kTile * kTile];
-  for (kernels::Pixel& pixel : pixels) pixel = {0, 0, 0, 1};
+  kernels::TilePixels pixels;
   const int32_t x = static_cast<int32_t>(index % tiles_x_) * kTile, y = static_cast<int32_t>(index / tiles_x_) * kTile;
   const kernels::Tile tile{.splats = splats_.data(),
                            .order = pair_splat_.data() + tile_begin_[index],
@@ -123,9 +122,9 @@ void Rasterizer::blend_tile(uint32_t index, const ImageTarget& target, const std
                            .width = std::min(kTile, static_cast<int32_t>(view_.width_px) - x),
                            .height = std::min(kTile, static_cast<int32_t>(view_.height_px) - y),
                            .alpha_cut = view_.alpha_cut,
-                           .pixels = pixels};
+                           .pixels = &pixels};
   const uint64_t begin_ns = clock.now();
-  const uint64_t blends = kernels::blend_tile_scalar(tile);
+  const uint64_t blends = tile.count == 0 ? 0 : kernels::blend_tile_scalar(tile);
   const uint64_t blended_ns = clock.now();
   resolve_tile(tile, background, target);
   tile_result_[index] = {.blends = blends, .blend_ns = blended_ns - begin_ns, .resolve_ns = clock.now() - blended_ns};

@@ -1,7 +1,7 @@
 // The seam between the rasterizer and its inner loop: plain structs, so that a kernel file needs nothing else and can be compiled with its
 // own flags.
 //
-// The scalar kernel is the specification. One lane is one pixel in any later kernel: every lane then runs this same program, and results
+// The scalar kernel is the specification. One lane is one pixel in any other kernel: every lane then runs this same program, and results
 // are equal to the bit.
 #pragma once
 
@@ -9,7 +9,8 @@
 
 namespace figurine::kernels {
 
-inline constexpr int32_t kTileSize = 32;  // pixels a side; a tile's state is 16 kB
+inline constexpr int32_t kTileSize = 32;  // pixels a side
+inline constexpr int32_t kTilePixels = kTileSize * kTileSize;
 
 // A projected Gaussian. With dx, dy the pixel centre minus the mean, in pixels:
 //   u = (dx - slope dy) scale_u,   v = dy scale_v,   alpha = min(kAlphaMax, opacity 2^-(u^2 + v^2)).
@@ -19,15 +20,19 @@ struct Splat {
   float slope;             // K = Sigma_xy / Sigma_yy
   float scale_u, scale_v;  // 1 / pixels
   float inverse_scale_u;   // pixels
-  float reach;             // u^2 + v^2 <= reach wherever alpha reaches the cut; slightly more than log2(opacity / cut)
-  float half_height;       // |dy| <= half_height there, pixels
+  float reach;             // u^2 + v^2 < reach wherever alpha reaches the cut: more than log2(opacity / cut), by a slack far above rounding
+  float half_height;       // |dy| < half_height there, pixels
   float opacity;
   float red, green, blue;
 };
 
-struct Pixel {
-  float red, green, blue;  // premultiplied
-  float transmittance;     // negative once the pixel has stopped; its absolute value is the transmittance
+// A tile's state in planes, [kTileSize, kTileSize] each; 16 kB. Colours are premultiplied. A transmittance turns negative when its pixel
+// stops; its absolute value stays the transmittance.
+struct TilePixels {
+  alignas(64) float red[kTilePixels];
+  alignas(64) float green[kTilePixels];
+  alignas(64) float blue[kTilePixels];
+  alignas(64) float transmittance[kTilePixels];
 };
 
 struct Tile {
@@ -37,10 +42,10 @@ struct Tile {
   int32_t x, y;           // image coordinates of the first pixel
   int32_t width, height;  // pixels inside the image, at most kTileSize
   float alpha_cut;
-  Pixel* pixels;  // [height, kTileSize], the caller sets them to 0, 0, 0, 1
+  TilePixels* pixels;  // written whole
 };
 
-// Blends the tile's splats into its pixels. Returns the number of contributions blended.
+// Clears the tile and blends its splats. Returns the number of contributions blended into pixels of the image.
 uint64_t blend_tile_scalar(const Tile& tile);
 
 }  // namespace figurine::kernels

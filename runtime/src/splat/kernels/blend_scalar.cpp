@@ -1,9 +1,12 @@
-// The blend, in scalar code: the specification of every later kernel.
+// The blend, in scalar code: the specification of every other kernel.
 //
-// Per splat and row, the ellipse's exact span; per pixel of the span, alpha, the cut, the stop, the sum. The span only skips pixels that
-// the cut would reject anyway (reach has slack for rounding), so the picture does not depend on it. Based on: Kerbl et al., 3D Gaussian
-// Splatting for Real-Time Radiance Field Rendering, 2023, eq. 3 (front-to-back alpha blending) and its rasterizer's constants in
-// figurine/gaussian.h.
+// Per splat the exact span of its ellipse in every row, then per pixel alpha, the cut, the stop, the sum. The span only skips pixels that
+// the cut would reject anyway (reach has slack above rounding), so neither it nor its widening to whole blocks shows in the picture. The
+// pixel program has no branches and no two pixels share a sum, so a compiler may run several pixels at a time with the same bits
+// (runtime/CMakeLists.txt lets it).
+//
+// Based on: Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023, eq. 3 (front-to-back alpha blending) and its
+// rasterizer's constants in figurine/gaussian.h.
 #include <cmath>
 
 #include "figurine/gaussian.h"
@@ -13,67 +16,121 @@
 namespace figurine::kernels {
 namespace {
 
-// Smallest integer >= value and largest integer <= value, first clamped to [low, high]. Written out because ceilf and floorf are library
-// calls on baseline x86-64.
-int32_t ceil_within(float value, int32_t low, int32_t high) {
-  value = value > static_cast<float>(low) ? value : static_cast<float>(low);
-  value = value < static_cast<float>(high) ? value : static_cast<float>(high);
-  const int32_t truncated = static_cast<int32_t>(value);
-  return truncated + (static_cast<float>(truncated) < value ? 1 : 0);
+constexpr int32_t kBlock = 4;  // spans are widened to multiples of it
+static_assert(kTileSize % kBlock == 0);
+constexpr uint32_t kSplatsPerCheck = 16;  // how often to look whether the whole tile has stopped
+constexpr uint32_t kPrefetch = 4;         // splats ahead: a tile's are scattered over the frame's
+
+// The rows of a splat's ellipse within a tile, indexed by row of the tile.
+struct Spans {
+  float centre[kTileSize];    // u = (x - centre) scale_u
+  float v2[kTileSize];        // v^2
+  int32_t begin[kTileSize];   // first pixel, rounded down to a block
+  int32_t blocks[kTileSize];  // 0 or less where the row is empty
+};
+
+float clamp(float value, float low, float high) {
+  value = value > low ? value : low;
+  return value < high ? value : high;
 }
 
-int32_t floor_within(float value, int32_t low, int32_t high) {
-  value = value > static_cast<float>(low) ? value : static_cast<float>(low);
-  value = value < static_cast<float>(high) ? value : static_cast<float>(high);
-  const int32_t truncated = static_cast<int32_t>(value);
-  return truncated - (static_cast<float>(truncated) > value ? 1 : 0);
+// Rows and columns count from the tile's first pixel; row_y holds the rows' centres in the image, middle_left the image's x of column 0's
+// centre.
+void find_spans(const Splat& splat, const float* __restrict row_y, float middle_left, float width, int32_t y_begin, int32_t y_end,
+                Spans& __restrict spans) {
+  for (int32_t y = y_begin; y < y_end; ++y) {
+    const float dy = row_y[y] - splat.mean_y;
+    const float v = dy * splat.scale_v, v2 = v * v;
+    const float room = splat.reach - v2;
+    const float half_width = std::sqrt(room > 0 ? room : 0.0f) * splat.inverse_scale_u;
+    const float centre = splat.mean_x + splat.slope * dy, middle = centre - middle_left;
+    // A pixel centre exactly on a bound is beyond reach, so it may count as inside or outside.
+    const int32_t begin = static_cast<int32_t>(clamp(middle - half_width + 1, 0, width)) & -kBlock;
+    const int32_t end = static_cast<int32_t>(clamp(middle + half_width + 1, 0, width));
+    spans.centre[y] = centre;
+    spans.v2[y] = v2;
+    spans.begin[y] = begin;
+    spans.blocks[y] = (end - begin + kBlock - 1) / kBlock;
+  }
+}
+
+// The pixel program, on the spans. Returns the number of contributions blended. Not inlined: inlined, GCC 14 loses __restrict and the
+// vector loop.
+[[gnu::noinline]] uint32_t blend_spans(const Splat& splat, const Spans& spans, int32_t y_begin, int32_t y_end, float alpha_cut,
+                                       const float* __restrict column_x, float* __restrict red, float* __restrict green,
+                                       float* __restrict blue, float* __restrict transmittance) {
+  const float scale_u = splat.scale_u, opacity = splat.opacity;
+  const float splat_red = splat.red, splat_green = splat.green, splat_blue = splat.blue;
+  uint32_t blended = 0;
+  for (int32_t y = y_begin; y < y_end; ++y) {
+    const float centre = spans.centre[y], v2 = spans.v2[y];
+    const int32_t begin = spans.begin[y], first = y * kTileSize + begin, count = spans.blocks[y] * kBlock;
+    for (int32_t i = 0; i < count; ++i) {
+      const float u = (column_x[begin + i] - centre) * scale_u;
+      const float weight = opacity * exp2_minus(u * u + v2);
+      const float alpha = weight < kAlphaMax ? weight : kAlphaMax;
+      // The light that meets the contribution: none where it is below the cut or the pixel has stopped.
+      const float before = transmittance[first + i];
+      const float living = before > 0.0f ? before : 0.0f;
+      const float light = weight >= alpha_cut ? living : 0.0f;
+      const float after = light * (1.0f - alpha);
+      const float share = after >= kTransmittanceStop ? light * alpha : 0.0f;
+      red[first + i] += share * splat_red;
+      green[first + i] += share * splat_green;
+      blue[first + i] += share * splat_blue;
+      // before - 2 light: -before where the pixel stops now, before where nothing met it.
+      transmittance[first + i] = after >= kTransmittanceStop ? after : before - (light + light);
+      blended += after >= kTransmittanceStop ? 1 : 0;
+    }
+  }
+  return blended;
+}
+
+// Whether every pixel has stopped.
+bool all_stopped(const TilePixels& pixels) {
+  uint32_t living = 0;
+  for (int32_t i = 0; i < kTilePixels; ++i) living += pixels.transmittance[i] > 0 ? 1 : 0;
+  return living == 0;
+}
+
+void clear(const Tile& tile) {
+  for (float* plane : {tile.pixels->red, tile.pixels->green, tile.pixels->blue}) {
+    for (int32_t i = 0; i < kTilePixels; ++i) plane[i] = 0;
+  }
+  // Pixels outside the image are stopped from the start: blocks may touch them, counts may not.
+  for (int32_t y = 0; y < kTileSize; ++y) {
+    for (int32_t x = 0; x < kTileSize; ++x) {
+      tile.pixels->transmittance[y * kTileSize + x] = y < tile.height && x < tile.width ? 1.0f : -1.0f;
+    }
+  }
 }
 
 }  // namespace
 
 uint64_t blend_tile_scalar(const Tile& tile) {
-  uint64_t blends = 0;
-  int32_t live = tile.width * tile.height;
-  const int32_t last_x = tile.x + tile.width - 1, last_y = tile.y + tile.height - 1;
+  clear(tile);
+  TilePixels& pixels = *tile.pixels;
+  const float left = static_cast<float>(tile.x), top = static_cast<float>(tile.y);
+  const float width = static_cast<float>(tile.width), height = static_cast<float>(tile.height);
+  Spans spans;
+  float column_x[kTileSize], row_y[kTileSize];  // pixel centres in the image
+  for (int32_t x = 0; x < kTileSize; ++x) column_x[x] = (left + static_cast<float>(x)) + 0.5f;
+  for (int32_t y = 0; y < kTileSize; ++y) row_y[y] = (top + static_cast<float>(y)) + 0.5f;
 
-  for (uint32_t i = 0; i < tile.count && live > 0; ++i) {
+  uint64_t blended = 0;
+  for (uint32_t i = 0; i < tile.count; ++i) {
+    if (i % kSplatsPerCheck == kSplatsPerCheck - 1 && all_stopped(pixels)) break;
+    if (i + kPrefetch < tile.count) __builtin_prefetch(&tile.splats[tile.order[i + kPrefetch]]);
     const Splat splat = tile.splats[tile.order[i]];
-    const int32_t y_begin = ceil_within(splat.mean_y - splat.half_height - 0.5f, tile.y, last_y + 1);
-    const int32_t y_end = floor_within(splat.mean_y + splat.half_height - 0.5f, tile.y - 1, last_y);
-    for (int32_t y = y_begin; y <= y_end; ++y) {
-      const float dy = (static_cast<float>(y) + 0.5f) - splat.mean_y;
-      const float v = dy * splat.scale_v, v2 = v * v;
-      const float room = splat.reach - v2;
-      if (!(room > 0)) continue;
-      const float half_width = std::sqrt(room) * splat.inverse_scale_u;
-      const float centre = splat.mean_x + splat.slope * dy;
-      const int32_t x_begin = ceil_within(centre - half_width - 0.5f, tile.x, last_x + 1);
-      const int32_t x_end = floor_within(centre + half_width - 0.5f, tile.x - 1, last_x);
-      Pixel* row = tile.pixels + (y - tile.y) * kTileSize - tile.x;
-      for (int32_t x = x_begin; x <= x_end; ++x) {
-        Pixel& pixel = row[x];
-        const float transmittance = pixel.transmittance;
-        if (!(transmittance > 0)) continue;
-        const float u = ((static_cast<float>(x) + 0.5f) - centre) * splat.scale_u;
-        float alpha = splat.opacity * exp2_nonpositive(-(u * u + v2));
-        if (!(alpha >= tile.alpha_cut)) continue;
-        alpha = alpha < kAlphaMax ? alpha : kAlphaMax;
-        const float next = transmittance * (1.0f - alpha);
-        if (next < kTransmittanceStop) {
-          pixel.transmittance = -transmittance;
-          --live;
-          continue;
-        }
-        const float weight = transmittance * alpha;
-        pixel.red += weight * splat.red;
-        pixel.green += weight * splat.green;
-        pixel.blue += weight * splat.blue;
-        pixel.transmittance = next;
-        ++blends;
-      }
-    }
+    // Rows and columns relative to the tile, ends exclusive. A pixel centre exactly on a bound is beyond reach: it may count as in or out.
+    const float middle_y = splat.mean_y - 0.5f - top;
+    const int32_t y_begin = static_cast<int32_t>(clamp(middle_y - splat.half_height + 1, 0, height));
+    const int32_t y_end = static_cast<int32_t>(clamp(middle_y + splat.half_height + 1, 0, height));
+    find_spans(splat, row_y, left + 0.5f, width, y_begin, y_end, spans);
+    blended +=
+        blend_spans(splat, spans, y_begin, y_end, tile.alpha_cut, column_x, pixels.red, pixels.green, pixels.blue, pixels.transmittance);
   }
-  return blends;
+  return blended;
 }
 
 }  // namespace figurine::kernels
