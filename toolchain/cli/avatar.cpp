@@ -53,9 +53,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   if (arguments.iterations) settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
   if (arguments.minutes) settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};
   if (arguments.precision) {
-    settings.precision = *arguments.precision == "auto"
-                             ? train::best_precision()
-                             : choose(*arguments.precision, {model::Precision::kFloat32, model::Precision::kBfloat16});
+    settings.bf16 = *arguments.precision == "bf16" || (*arguments.precision == "auto" && train::has_fast_bf16());
   }
   if (arguments.background) {
     settings.background =
@@ -91,7 +89,7 @@ train::TrainRequest make_request(const AvatarArguments& arguments, const std::st
     if (request.body.empty()) throw InputError("--body is needed for a new run");
     request.resume = arguments.resume && !arguments.all;  // with --all, what has not begun begins now
     request.settings = train::preset_settings(arguments.preset.value_or("edge"));
-    request.settings.precision = train::best_precision();
+    request.settings.bf16 = train::has_fast_bf16();
     overlay(arguments, request.settings);
   }
   request.settings.threads = thread_count(arguments.threads);

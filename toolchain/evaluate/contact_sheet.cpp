@@ -80,7 +80,7 @@ ports::ImageU8 make_contact_sheet(train::TrainedAvatar& avatar, const ContactShe
   float aspect = 0.3f;  // width over height of the widest person
   for (const auto& [frame, camera] : choose_pictures(data, options.pairs)) {
     const Camera& view = data.cameras()[camera].camera;
-    const train::TrainedAvatar::PosedFrame posed = avatar.pose(frame);
+    const PosedFrame posed = pose_frame(avatar, frame);
     Pair pair{.truth = true_picture(data, frame, camera),
               .prediction = render_picture(avatar, posed, view),
               .person = {},

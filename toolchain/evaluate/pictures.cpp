@@ -22,7 +22,14 @@ uint8_t strongest_joint(const Body& body, uint32_t texel) {
 std::span<const uint8_t> head_joints() { return kHeadJoints; }
 std::span<const uint8_t> left_hand_joints() { return kLeftHandJoints; }
 
-Picture render_picture(train::TrainedAvatar& avatar, const train::TrainedAvatar::PosedFrame& posed, const Camera& camera) {
+PosedFrame pose_frame(train::TrainedAvatar& avatar, size_t frame) {
+  train::AvatarModel& model = avatar.model();
+  PosedFrame result{model.pose(model.from_capture(avatar.data().frames()[frame]).view()), {}};
+  result.head = model.evaluate(result.posed);
+  return result;
+}
+
+Picture render_picture(train::TrainedAvatar& avatar, const PosedFrame& posed, const Camera& camera) {
   return quantise_picture(camera.width_px, camera.height_px, avatar.model().render_rgba(posed.head, posed.posed, camera));
 }
 

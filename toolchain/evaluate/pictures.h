@@ -5,11 +5,18 @@
 #include <span>
 
 #include "toolchain/evaluate/metrics.h"
+#include "toolchain/train/avatar_model.h"
 #include "toolchain/train/trained_avatar.h"
 
 namespace figurine::evaluate {
 
-Picture render_picture(train::TrainedAvatar& avatar, const train::TrainedAvatar::PosedFrame& posed, const Camera& camera);
+// One captured frame, decoded for all its cameras.
+struct PosedFrame {
+  train::PosedBody posed;
+  torch::Tensor head;
+};
+PosedFrame pose_frame(train::TrainedAvatar& avatar, size_t frame);
+Picture render_picture(train::TrainedAvatar& avatar, const PosedFrame& posed, const Camera& camera);
 Picture true_picture(const dataset::Dataset& data, size_t frame, size_t camera);
 
 // The bounding box of the texels that `joints` move most, in the image; enlarged by a share of its sides. Empty if they are behind the

@@ -84,12 +84,12 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar, const Recon
   for (size_t frame = 0; frame < frames; ++frame) {
     const dataset::FrameSplit split = data.frames()[frame].split;
     if (split == dataset::FrameSplit::kTrain && training_frames++ % options.view_frame_step != 0) continue;
-    std::optional<train::TrainedAvatar::PosedFrame> posed;
+    std::optional<PosedFrame> posed;
     for (size_t camera = 0; camera < cameras; ++camera) {
       const dataset::Role role = data.role(frame, camera);
       if (role == dataset::Role::kTrain) continue;
       if (interrupt.requested()) throw train::Interrupted("evaluate: stopped; nothing was written");
-      if (!posed) posed = avatar.pose(frame);
+      if (!posed) posed = pose_frame(avatar, frame);
       const Camera& view = data.cameras()[camera].camera;
       const Picture prediction = render_picture(avatar, *posed, view);
       const Picture truth = true_picture(data, frame, camera);

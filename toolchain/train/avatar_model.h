@@ -13,15 +13,10 @@
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/model/render.h"
 #include "toolchain/model/unet.h"
+#include "toolchain/train/owned_pose.h"
 #include "toolchain/train/settings.h"
 
 namespace figurine::train {
-
-struct OwnedPose {
-  std::array<float, 3> root_translation_m{0, 0, 0};
-  std::vector<float> rotations;  // [J,4]
-  PoseView view() const { return {root_translation_m, rotations}; }
-};
 
 // What a pose becomes before any network.
 struct PosedBody {
@@ -32,7 +27,7 @@ struct PosedBody {
 class AvatarModel {
  public:
   // body is borrowed. Throws InputError if it does not fit the settings: another T, fewer shape coefficients than the person has.
-  AvatarModel(const Body& body, std::vector<float> shape, const TrainSettings& settings, model::Precision precision);
+  AvatarModel(const Body& body, std::vector<float> shape, const TrainSettings& settings, bool bf16);
 
   const Body& body() const { return body_; }
   const TrainSettings& settings() const { return settings_; }

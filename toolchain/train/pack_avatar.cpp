@@ -7,6 +7,7 @@
 #include "formats/writer/package_writer.h"
 #include "ports/linux/png.h"
 #include "toolchain/error.h"
+#include "toolchain/train/avatar_model.h"
 
 namespace figurine::train {
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "figurine/package.h"
+#include "toolchain/train/owned_pose.h"
 #include "toolchain/train/trained_avatar.h"
 
 namespace figurine::train {

@@ -14,6 +14,8 @@
 
 #include "ports/linux/files.h"
 #include "toolchain/error.h"
+#include "toolchain/model/adamw.h"
+#include "toolchain/model/unet.h"
 
 namespace figurine::train {
 

@@ -13,9 +13,13 @@
 #include <string>
 #include <vector>
 
-#include "toolchain/model/unet.h"
 #include "toolchain/train/settings.h"
 #include "toolchain/train/tensor_file.h"
+
+namespace figurine::model {
+class PoseUNet;
+class AdamW;
+}  // namespace figurine::model
 
 namespace figurine::train {
 

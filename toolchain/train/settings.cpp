@@ -19,7 +19,6 @@ Enum parse(const std::string& text, const std::array<Enum, N>& values, const std
   throw InputError(where + ": unknown value \"" + text + "\"");
 }
 
-constexpr std::array kPrecisions{model::Precision::kFloat32, model::Precision::kBfloat16};
 constexpr std::array kBackgrounds{TrainingBackground::kBlack, TrainingBackground::kGrey, TrainingBackground::kRandom};
 constexpr std::array kTemplateModes{TemplateMode::kMean, TemplateMode::kShaped};
 
@@ -54,15 +53,14 @@ Network make_network(const TrainSettings& settings) {
   return make_pose_unet(preset.uv_size, input_channels(settings), preset.channels, head_channels(settings.decoding.sh_degree));
 }
 
-model::Precision best_precision() {
+bool has_fast_bf16() {
 #if defined(__x86_64__)
   __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512bf16")) return model::Precision::kBfloat16;
+  return __builtin_cpu_supports("avx512bf16");
+#else
+  return false;
 #endif
-  return model::Precision::kFloat32;
 }
-
-const char* to_string(model::Precision precision) { return precision == model::Precision::kBfloat16 ? "bf16" : "f32"; }
 
 const char* to_string(TrainingBackground background) {
   switch (background) {
@@ -96,8 +94,8 @@ nlohmann::json to_json(const TrainSettings& s) {
       {"ramp_iterations", s.schedule.ramp_iterations},
       {"learning_rate_floor", s.schedule.floor_fraction},
       {"budget", {{"iterations", s.schedule.budget.iterations}, {"seconds", s.schedule.budget.seconds}}},
-      {"adamw", {{"beta1", s.adamw.beta1}, {"beta2", s.adamw.beta2}, {"epsilon", s.adamw.epsilon}, {"weight_decay", s.adamw.weight_decay}}},
-      {"precision", to_string(s.precision)},
+      {"adamw", {{"beta1", s.beta1}, {"beta2", s.beta2}, {"epsilon", s.epsilon}, {"weight_decay", s.weight_decay}}},
+      {"precision", s.bf16 ? "bf16" : "f32"},
       {"threads", s.threads},
       {"loss", {{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}, {"lpips", 0.0}}},
       {"background", to_string(s.background)},
@@ -127,11 +125,13 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
                   .budget = {.iterations = json.at("budget").at("iterations").get<uint64_t>(),
                              .seconds = json.at("budget").at("seconds").get<double>()}};
     const nlohmann::json& adamw = json.at("adamw");
-    s.adamw = {.beta1 = adamw.at("beta1").get<double>(),
-               .beta2 = adamw.at("beta2").get<double>(),
-               .epsilon = adamw.at("epsilon").get<double>(),
-               .weight_decay = adamw.at("weight_decay").get<double>()};
-    s.precision = parse(json.at("precision").get<std::string>(), kPrecisions, where + ": precision");
+    s.beta1 = adamw.at("beta1").get<double>();
+    s.beta2 = adamw.at("beta2").get<double>();
+    s.epsilon = adamw.at("epsilon").get<double>();
+    s.weight_decay = adamw.at("weight_decay").get<double>();
+    const std::string precision = json.at("precision").get<std::string>();
+    require(precision == "bf16" || precision == "f32", where, "precision: is neither f32 nor bf16");
+    s.bf16 = precision == "bf16";
     s.threads = json.at("threads").get<uint32_t>();
     s.ssim_weight = json.at("loss").at("ssim").get<float>();
     s.mask_weight = json.at("loss").at("mask").get<float>();

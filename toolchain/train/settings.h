@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "figurine/avatar.h"
-#include "toolchain/model/unet.h"
 #include "toolchain/train/schedule.h"
 
 namespace figurine::train {
@@ -39,8 +38,9 @@ struct TrainSettings {
   uint64_t seed = 1;  // of the order of the images; initial weights are the same for all avatars (kInitialWeightsSeed, or --init)
   std::string init;   // weights or run to start from; empty: the common initial weights
   Schedule schedule{.peak = 2e-3, .ramp_iterations = 50, .floor_fraction = 0.02, .budget = {.iterations = 0, .seconds = 600}};
-  model::AdamWOptions adamw{.beta1 = 0.9, .beta2 = 0.999, .epsilon = 1e-10, .weight_decay = 0.0};
-  model::Precision precision = model::Precision::kFloat32;
+  // AdamW's. An epsilon of 1e-8 would swallow the small gradients of a mean loss.
+  double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-10, weight_decay = 0;
+  bool bf16 = false;  // arithmetic of the convolutions while training; weights, head and evaluation are float
   uint32_t threads = 1;
   float ssim_weight = 0.1f;
   float mask_weight = 0.1f;
@@ -61,9 +61,8 @@ Network make_network(const TrainSettings& settings);
 TrainSettings preset_settings(const std::string& name);
 
 // bf16 where the CPU multiplies it in hardware, float elsewhere.
-model::Precision best_precision();
+bool has_fast_bf16();
 
-const char* to_string(model::Precision precision);
 const char* to_string(TrainingBackground background);
 const char* to_string(TemplateMode mode);
 

@@ -5,8 +5,13 @@
 #include <filesystem>
 
 #include "toolchain/error.h"
+#include "toolchain/train/avatar_model.h"
 
 namespace figurine::train {
+
+TrainedAvatar::TrainedAvatar() = default;
+TrainedAvatar::TrainedAvatar(TrainedAvatar&&) noexcept = default;
+TrainedAvatar::~TrainedAvatar() = default;
 
 TrainedAvatar TrainedAvatar::open(const OpenRunOptions& options) {
   TrainedAvatar avatar;
@@ -26,16 +31,10 @@ TrainedAvatar TrainedAvatar::open(const OpenRunOptions& options) {
   TrainSettings settings = description.settings;
   settings.threads = options.threads;
   at::set_num_threads(static_cast<int>(options.threads));
-  avatar.model_ = std::make_unique<AvatarModel>(avatar.body_->package.body(), description.shape, settings, model::Precision::kFloat32);
+  avatar.model_ = std::make_unique<AvatarModel>(avatar.body_->package.body(), description.shape, settings, false);
   if (!std::filesystem::exists(run.weights())) throw InputError(options.run + ": has no weights yet");
   load_weights(run.weights(), avatar.model_->unet());
   return avatar;
-}
-
-TrainedAvatar::PosedFrame TrainedAvatar::pose(size_t frame) {
-  PosedFrame result{model_->pose(model_->from_capture(data_->frames()[frame]).view()), {}};
-  result.head = model_->evaluate(result.posed);
-  return result;
 }
 
 }  // namespace figurine::train

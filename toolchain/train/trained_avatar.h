@@ -5,11 +5,12 @@
 #include <string>
 
 #include "toolchain/dataset/dataset.h"
-#include "toolchain/train/avatar_model.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/trainer.h"
 
 namespace figurine::train {
+
+class AvatarModel;
 
 struct OpenRunOptions {
   std::string run;
@@ -30,14 +31,12 @@ class TrainedAvatar {
   AvatarModel& model() { return *model_; }
   const AvatarModel& model() const { return *model_; }
 
-  // One captured frame, decoded for all its cameras.
-  struct PosedFrame {
-    PosedBody posed;
-    torch::Tensor head;
-  };
-  PosedFrame pose(size_t frame);
+  TrainedAvatar(TrainedAvatar&&) noexcept;
+  ~TrainedAvatar();
 
  private:
+  TrainedAvatar();
+
   RunDescription description_;
   std::unique_ptr<PackageFile> body_;
   std::unique_ptr<dataset::Dataset> data_;

@@ -8,6 +8,7 @@
 
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/error.h"
+#include "toolchain/model/adamw.h"
 #include "toolchain/model/loss.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/interrupt.h"
@@ -62,8 +63,9 @@ class Trainer {
         run_{request.run},
         data_(data),
         description_(std::move(description)),
-        model_(body.package.body(), data.shape(), settings, settings.precision),
-        optimiser_(model_.unet().parameter_count(), settings.adamw) {}
+        model_(body.package.body(), data.shape(), settings, settings.bf16),
+        optimiser_(model_.unet().parameter_count(),
+                   {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {}
 
   TrainResult run() {
     start();

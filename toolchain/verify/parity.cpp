@@ -6,6 +6,7 @@
 
 #include "figurine/renderer.h"
 #include "toolchain/error.h"
+#include "toolchain/train/avatar_model.h"
 
 namespace figurine::verify {
 

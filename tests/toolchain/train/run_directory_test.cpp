@@ -6,6 +6,8 @@
 #include <fstream>
 
 #include "toolchain/error.h"
+#include "toolchain/model/adamw.h"
+#include "toolchain/model/unet.h"
 #include "toolchain/train/run_directory.h"
 
 namespace figurine::train {
@@ -86,7 +88,7 @@ TEST_F(RunDirectoryTest, TensorFileNamesWhatIsWrong) {
 TEST_F(RunDirectoryTest, CheckpointRestoresWeightsMomentsAndCounters) {
   const TrainSettings settings = preset_settings("nano");
   model::PoseUNet unet(make_network(settings), {.seed = 3}), other(make_network(settings), {.seed = 4});
-  model::AdamW adamw(unet.parameter_count(), settings.adamw), restored(unet.parameter_count(), settings.adamw);
+  model::AdamW adamw(unet.parameter_count(), {}), restored(unet.parameter_count(), {});
   adamw.first_moment.uniform_(-1, 1);
   adamw.second_moment.uniform_(0, 1);
   adamw.steps = 123456;
@@ -123,7 +125,7 @@ TEST_F(RunDirectoryTest, SettingsReadBackEqual) {
   settings.freeze_pose = true;
   settings.schedule.budget = {.iterations = 77, .seconds = 0};
   settings.background = TrainingBackground::kRandom;
-  settings.precision = model::Precision::kBfloat16;
+  settings.bf16 = true;
   const nlohmann::json json = to_json(settings);
   EXPECT_EQ(to_json(settings_from_json(json, "test")), json);
 }

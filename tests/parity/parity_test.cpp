@@ -1,0 +1,84 @@
+// Train, pack, open, and hold the runtime's picture against the trainer's: the whole line at the smallest size.
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "ports/linux/png.h"
+#include "tests/toolchain/train/small_capture.h"
+#include "toolchain/train/pack_avatar.h"
+#include "toolchain/train/trainer.h"
+#include "toolchain/verify/parity.h"
+
+namespace figurine::verify {
+namespace {
+
+using testing_tools::small_capture;
+using testing_tools::TemporaryFolder;
+
+constexpr double kWanted_db = 60;
+
+struct PackedRun {
+  TemporaryFolder folder;
+  std::string run = folder.path("run"), path = folder.path("avatar.fgn");
+
+  explicit PackedRun(TemplateMode mode) {
+    train::TrainRequest request{
+        .data = small_capture().data, .body = small_capture().body, .run = run, .settings = train::preset_settings("nano"), .quiet = true};
+    request.settings.template_mode = mode;
+    request.settings.schedule.budget = {.iterations = 200, .seconds = 0};
+    request.settings.threads = 2;
+    train::train_avatar(request);
+    train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = run});
+    throw_if_error(ports::write_file_atomically(path, train::pack_avatar(avatar, {run}, {.name = "swinger"})), path);
+  }
+};
+
+void expect_parity(TemplateMode mode) {
+  const PackedRun packed(mode);
+  train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
+  const train::PackageFile package = train::open_package(packed.path, PackageKind::kAvatar);
+  const ParityReport report = compare_with_runtime(avatar, package.package, {.views = 6});
+  std::printf("parity %.2f dB, worst %.2f dB, largest error %.3g\n", report.psnr_db, report.worst_psnr_db, report.largest_error);
+  ASSERT_EQ(report.views.size(), 6u);
+  for (const ParityView& view : report.views) EXPECT_GT(view.foreground, 100u) << "the person is not in the picture";
+  EXPECT_GE(report.worst_psnr_db, kWanted_db);
+}
+
+TEST(Parity, OfShapedTemplateIsAtLeast60dB) { expect_parity(TemplateMode::kShaped); }
+TEST(Parity, OfMeanTemplateIsAtLeast60dB) { expect_parity(TemplateMode::kMean); }
+
+TEST(Pack, SaysWhatADeviceNeedsToKnow) {
+  const PackedRun packed(TemplateMode::kShaped);
+  const train::PackageFile file = train::open_package(packed.path, PackageKind::kAvatar);
+  const Avatar& avatar = file.package.avatar();
+  const train::PackageFile body = train::open_package(small_capture().body, PackageKind::kBody);
+  EXPECT_TRUE(check_avatar_fits_body(avatar, body.package).ok());
+  EXPECT_EQ(avatar.name, "swinger");
+  EXPECT_EQ(avatar.preset, "nano");
+  EXPECT_EQ(count_parameters(avatar.network), 11326u);
+  EXPECT_EQ(file.package.budget().gaussians, body.package.body().texel_count());
+  EXPECT_GT(file.package.budget().macs_per_frame, 0u);
+  EXPECT_EQ(avatar.pose_statistics.joints.size(), 21u);
+  EXPECT_EQ(avatar.pose_statistics.covariance.size(), 63u * 63u);
+  EXPECT_EQ(file.package.provenance().depicted_person, "synthetic");
+  EXPECT_FALSE(file.package.provenance().sources.empty());
+  const Result<ports::ImageU8> golden = ports::decode_png(std::as_bytes(avatar.golden.png), "golden");
+  ASSERT_TRUE(golden.ok()) << golden.status().message();
+  EXPECT_EQ(golden->width_px, avatar.golden.camera.width_px);
+  // A picture of somebody, not of the background.
+  size_t different = 0;
+  for (uint8_t value : golden->pixels) different += value < 120 || value > 136;
+  EXPECT_GT(different, golden->pixels.size() / 50);
+  EXPECT_GT(measure_memory(file.package, body.package, {avatar.golden.root_translation_m, avatar.golden.rotations}, avatar.golden.camera), 10000u);
+}
+
+TEST(Pack, IsTheSameBytesTwice) {
+  const PackedRun packed(TemplateMode::kShaped);
+  train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
+  const std::vector<std::byte> once = train::pack_avatar(avatar, {packed.run}, {}), twice = train::pack_avatar(avatar, {packed.run}, {});
+  EXPECT_EQ(once.size(), twice.size());
+  EXPECT_EQ(std::memcmp(once.data(), twice.data(), once.size()), 0);
+}
+
+}  // namespace
+}  // namespace figurine::verify

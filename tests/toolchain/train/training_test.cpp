@@ -1,0 +1,226 @@
+// Training itself, at the smallest size that shows anything: it beats a flat colour, a resumed run equals an uninterrupted one, bad input is refused.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/toolchain/train/small_capture.h"
+#include "toolchain/error.h"
+#include "toolchain/evaluate/reconstruction.h"
+#include "toolchain/train/interrupt.h"
+#include "toolchain/train/pack_avatar.h"
+#include "toolchain/train/sample_feed.h"
+#include "toolchain/train/trained_avatar.h"
+#include "toolchain/train/trainer.h"
+
+namespace figurine::train {
+namespace {
+
+namespace fs = std::filesystem;
+using testing_tools::small_capture;
+using testing_tools::TemporaryFolder;
+
+TrainRequest request(const std::string& run, uint64_t iterations) {
+  TrainRequest request{.data = small_capture().data, .body = small_capture().body, .run = run, .settings = preset_settings("nano"), .quiet = true};
+  request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
+  request.settings.threads = 2;
+  return request;
+}
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::string error_of(const TrainRequest& request) {
+  try {
+    train_avatar(request);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+nlohmann::json evaluate_run(const std::string& run) {
+  TrainedAvatar avatar = TrainedAvatar::open({.run = run, .threads = 2});
+  return evaluate::evaluate_reconstruction(avatar, {.quiet = true});
+}
+
+TEST(Training, BeatsAFlatColourOnHeldOutViewsAndPoses) {
+  const TemporaryFolder folder;
+  const TrainResult result = train_avatar(request(folder.path("run"), 600));
+  EXPECT_EQ(result.state.iteration, 600u);
+  const nlohmann::json report = evaluate_run(folder.path("run"));
+  for (const char* group : {"held_out_views", "held_out_poses"}) {
+    const double psnr = report.at(group).at("psnr_db"), flat = report.at(group).at("flat_psnr_db");
+    std::printf("%s: %.2f dB, flat colour %.2f dB\n", group, psnr, flat);
+    EXPECT_GT(psnr, flat + 3) << group;
+  }
+}
+
+TEST(Training, LowersTheLossFromTheFirstLogRowToTheLast) {
+  const TemporaryFolder folder;
+  train_avatar(request(folder.path("run"), 300));
+  const std::vector<LogRow> rows = load_log({folder.path("run")}, 300);
+  ASSERT_EQ(rows.size(), 6u);
+  EXPECT_LT(rows.back().loss, 0.7 * rows.front().loss);
+  EXPECT_GT(rows.back().psnr_db, rows.front().psnr_db + 3);
+}
+
+TEST(Training, ResumedAfterAnInterruptEqualsAnUninterruptedRunBitwise) {
+  const TemporaryFolder folder;
+  TrainRequest straight = request(folder.path("straight"), 90);
+  straight.settings.background = TrainingBackground::kRandom;  // the counter-based generator has to go on as well
+  train_avatar(straight);
+  TrainRequest broken = straight;
+  broken.run = folder.path("broken");
+  broken.stop_after = 37;
+  EXPECT_THROW(train_avatar(broken), Interrupted);
+  EXPECT_EQ(read_run({broken.run}).json.at("status"), "interrupted");
+  broken.stop_after = 0;
+  broken.resume = true;
+  const TrainResult result = train_avatar(broken);
+  EXPECT_EQ(result.state.iteration, 90u);
+  EXPECT_EQ(bytes_of(RunDirectory{broken.run}.weights()), bytes_of(RunDirectory{straight.run}.weights()));
+}
+
+TEST(Training, OfAFinishedRunHasNothingToResume) {
+  const TemporaryFolder folder;
+  TrainRequest once = request(folder.path("run"), 5);
+  train_avatar(once);
+  const std::string weights = bytes_of(RunDirectory{once.run}.weights());
+  once.resume = true;
+  EXPECT_TRUE(train_avatar(once).was_finished);
+  EXPECT_EQ(bytes_of(RunDirectory{once.run}.weights()), weights);
+}
+
+TEST(Training, WithFrozenPoseSeesOneInputPerRootOrientation) {
+  TrainSettings settings = preset_settings("nano");
+  settings.freeze_pose = true;
+  const PackageFile body = open_package(small_capture().body, PackageKind::kBody);
+  const dataset::Dataset data = dataset::Dataset::open(small_capture().data, {.body = &body.package.body()});
+  const AvatarModel frozen(body.package.body(), data.shape(), settings, false);
+  settings.freeze_pose = false;
+  const AvatarModel moving(body.package.body(), data.shape(), settings, false);
+  OwnedPose a = frozen.from_capture(data.frames()[0]), b = frozen.from_capture(data.frames()[9]);
+  std::copy_n(a.rotations.begin(), 4, b.rotations.begin());  // one root orientation, two articulations
+  EXPECT_TRUE(torch::equal(frozen.pose(a.view()).input, frozen.pose(b.view()).input));
+  EXPECT_FALSE(torch::equal(moving.pose(a.view()).input, moving.pose(b.view()).input));
+  // The Gaussians are skinned with the true pose all the same.
+  const PosedBody posed_frozen = frozen.pose(b.view()), posed_moving = moving.pose(b.view());
+  for (size_t j = 0; j < posed_frozen.world_from_rest.size(); ++j) EXPECT_EQ(posed_frozen.world_from_rest[j].m, posed_moving.world_from_rest[j].m);
+  // Turning the root turns the input.
+  b.rotations[0] = 0, b.rotations[1] = 0, b.rotations[2] = 1, b.rotations[3] = 0;
+  EXPECT_FALSE(torch::equal(frozen.pose(a.view()).input, frozen.pose(b.view()).input));
+}
+
+TEST(Training, WithFrozenPoseTrainsAndIsRefusedByPack) {
+  const TemporaryFolder folder;
+  TrainRequest frozen = request(folder.path("run"), 20);
+  frozen.settings.freeze_pose = true;
+  train_avatar(frozen);
+  TrainedAvatar avatar = TrainedAvatar::open({.run = frozen.run});
+  EXPECT_THROW(pack_avatar(avatar, {frozen.run}, {}), InputError);
+}
+
+TEST(Training, WithMeanTemplateWarmupAndWholeImagesRuns) {
+  const TemporaryFolder folder;
+  TrainRequest mean = request(folder.path("run"), 40);
+  mean.settings.template_mode = TemplateMode::kMean;
+  mean.settings.warmup_iterations = 20;
+  mean.settings.background = TrainingBackground::kGrey;
+  mean.settings.whole_image_period = 1;
+  EXPECT_EQ(train_avatar(mean).state.iteration, 40u);
+}
+
+TEST(Training, FromTheWeightsOfAnotherRunStartsThere) {
+  const TemporaryFolder folder;
+  train_avatar(request(folder.path("first"), 300));
+  TrainRequest second = request(folder.path("second"), 50);
+  second.settings.init = folder.path("first");
+  train_avatar(second);
+  EXPECT_LT(load_log({second.run}, 50)[0].loss, 0.8 * load_log({folder.path("first")}, 50)[0].loss);
+}
+
+TEST(Training, PutsTheRootOfTheMeanTemplateWhereThePersonsWas) {
+  TrainSettings settings = preset_settings("nano");
+  settings.template_mode = TemplateMode::kMean;
+  const PackageFile body = open_package(small_capture().body, PackageKind::kBody);
+  const dataset::Dataset data = dataset::Dataset::open(small_capture().data, {.body = &body.package.body()});
+  const AvatarModel mean(body.package.body(), data.shape(), settings, false);
+  std::vector<float> joints(body.package.body().joint_position_m.size()), texels(body.package.body().texel_position_m.size());
+  shape_body(body.package.body(), data.shape(), joints, texels);
+  const OwnedPose pose = mean.from_capture(data.frames()[0]);
+  const std::array<float, 3> root = root_position(body.package.body().mean_skeleton(), pose.view());
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(root[k], joints[k] + data.frames()[0].root_translation_m[k], 1e-6);
+}
+
+TEST(SampleFeed, CropHoldsTheMaskAndItsMargin) {
+  dataset::CaptureImage image{.width_px = 20, .height_px = 10, .rgb = std::vector<uint8_t>(600, 7), .alpha = std::vector<uint8_t>(200, 0)};
+  image.alpha[3 * 20 + 5] = 9;
+  image.alpha[6 * 20 + 18] = 255;
+  const CroppedImage crop = crop_to_mask(image, 2);
+  EXPECT_EQ(crop.rect.x, 3u);
+  EXPECT_EQ(crop.rect.y, 1u);
+  EXPECT_EQ(crop.rect.width, 17u);  // to column 19, cut at the image
+  EXPECT_EQ(crop.rect.height, 8u);
+  EXPECT_EQ(crop.rgba[(2 * 17 + 2) * 4 + 3], 9);
+  // The target of the whole image has the crop in its place and zeros around.
+  const torch::Tensor target = target_of(crop, {0, 0, 20, 10});
+  EXPECT_EQ(target[3][6][18].item<float>(), 1);
+  EXPECT_EQ(target[3][0][0].item<float>(), 0);
+  EXPECT_EQ(target[0][0][0].item<float>(), 0);
+  EXPECT_NEAR(target[0][6][18].item<float>(), 7 / 255.0, 1e-6);
+}
+
+TEST(TrainingInput, IsRefusedWithOneClearLine) {
+  const TemporaryFolder folder;
+  TrainRequest bad = request(folder.path("run"), 5);
+  bad.data = folder.path("nowhere");
+  EXPECT_NE(error_of(bad).find("nowhere"), std::string::npos) << error_of(bad);
+  bad = request(folder.path("run"), 5);
+  bad.body = small_capture().data + "/figurine.json";
+  EXPECT_NE(error_of(bad).find("figurine.json"), std::string::npos) << error_of(bad);
+  bad = request(folder.path("run"), 5);
+  bad.settings = preset_settings("edge");
+  bad.settings.schedule.budget = {.iterations = 5, .seconds = 0};
+  EXPECT_NE(error_of(bad).find("T = 32"), std::string::npos) << error_of(bad);
+  bad = request(folder.path("run"), 5);
+  bad.settings.init = folder.path("no_weights");
+  EXPECT_NE(error_of(bad).find("no_weights"), std::string::npos) << error_of(bad);
+  bad = request(folder.path("absent"), 5);
+  bad.resume = true;
+  EXPECT_NE(error_of(bad).find("no run to resume"), std::string::npos) << error_of(bad);
+}
+
+TEST(TrainingInput, ARunThatIsThereIsNotOverwritten) {
+  const TemporaryFolder folder;
+  const TrainRequest once = request(folder.path("run"), 5);
+  train_avatar(once);
+  EXPECT_NE(error_of(once).find("--resume"), std::string::npos);
+}
+
+TEST(TrainingInput, ADamagedImageStopsTheRunAndIsNamed) {
+  const TemporaryFolder folder;
+  fs::copy(small_capture().data, folder.path("data"), fs::copy_options::recursive);
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path("data") + "/images_lr")) {
+    if (entry.path().extension() == ".jpg") fs::resize_file(entry.path(), fs::file_size(entry.path()) * 3 / 4);
+  }
+  TrainRequest damaged = request(folder.path("run"), 5);
+  damaged.data = folder.path("data");
+  EXPECT_NE(error_of(damaged).find(".jpg"), std::string::npos) << error_of(damaged);
+}
+
+TEST(TrainingInput, ACutOffCheckpointIsRefusedByName) {
+  const TemporaryFolder folder;
+  TrainRequest stopped = request(folder.path("run"), 20);
+  stopped.stop_after = 5;
+  EXPECT_THROW(train_avatar(stopped), Interrupted);
+  fs::resize_file(RunDirectory{stopped.run}.checkpoint(), 1000);
+  stopped.resume = true;
+  stopped.stop_after = 0;
+  EXPECT_NE(error_of(stopped).find("checkpoint.safetensors"), std::string::npos) << error_of(stopped);
+}
+
+}  // namespace
+}  // namespace figurine::train
