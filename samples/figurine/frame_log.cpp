@@ -34,7 +34,14 @@ void FrameLog::add(const FrameStatistics& statistics, uint64_t total_ns) {
   macs_.push_back(static_cast<double>(statistics.macs));
 }
 
-Summary FrameLog::stage_ms(Stage stage) const { return summarise(stage_ms_[static_cast<size_t>(stage)]); }
+Summary FrameLog::stages_ms(std::span<const Stage> stages) const {
+  std::vector<double> sums(frames(), 0);
+  for (const Stage stage : stages) {
+    const std::vector<double>& values = stage_ms_[static_cast<size_t>(stage)];
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] += values[i];
+  }
+  return summarise(std::move(sums));
+}
 
 nlohmann::ordered_json FrameLog::stages_json() const {
   const auto entry = [](const Summary& summary) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <vector>
 
 #include "figurine/renderer.h"
@@ -21,9 +22,8 @@ class FrameLog {
   void add(const FrameStatistics& statistics, uint64_t total_ns);
   size_t frames() const { return total_ms_.size(); }
   Summary total_ms() const { return summarise(total_ms_); }
-  Summary stage_ms(Stage stage) const;
-  double median_blends() const { return summarise(blends_).median; }
-  double median_macs() const { return summarise(macs_).median; }
+  // Of some stages together, summed within each frame.
+  Summary stages_ms(std::span<const Stage> stages) const;
 
   // {"total": {"median": ms, "p90": ms}, "maps": {...}, ...}, in the order of the stages.
   nlohmann::ordered_json stages_json() const;

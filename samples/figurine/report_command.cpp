@@ -41,6 +41,7 @@ struct Dial {
   std::string name, meaning;
   double theoretical_order = 0;  // error ~ value^order
   std::string theory;
+  std::vector<Stage> stages;      // that the dial can make cheaper: their time is the cost that is plotted
   std::vector<Setting> settings;  // from coarse to fine
 };
 
@@ -58,6 +59,7 @@ Dial alpha_cut_dial() {
       .theory =
           "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is missing from the picture falls in proportion to the "
           "cut.",
+      .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve},
       .settings = {}};
   for (const int inverse : {16, 32, 64, 128, 255, 512, 1024, 4096, 16384}) {
     const double cut = 1.0 / inverse;
@@ -171,9 +173,24 @@ nlohmann::ordered_json finite_or_null(double value) {
   return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
 }
 
+// Slope of log error over log value by least squares; null where fewer than two settings have an error.
+nlohmann::ordered_json overall_order(const Dial& dial, const std::vector<Measurement>& measurements) {
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+  for (size_t s = 0; s < dial.settings.size(); ++s) {
+    if (!(measurements[s].error.squared > 0)) continue;
+    const double u = std::log(dial.settings[s].value), v = std::log(measurements[s].error.rmse());
+    n += 1, x += u, y += v, xx += u * u, xy += u * v;
+  }
+  const double determinant = n * xx - x * x;
+  return n >= 2 && determinant > 0 ? nlohmann::ordered_json((n * xy - x * y) / determinant) : nlohmann::ordered_json();
+}
+
 nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement>& measurements) {
   nlohmann::ordered_json json = {
       {"name", dial.name}, {"meaning", dial.meaning}, {"theoretical_order", dial.theoretical_order}, {"theory", dial.theory}};
+  json["observed_order"] = overall_order(dial, measurements);
+  json["stages"] = nlohmann::ordered_json::array();
+  for (const Stage stage : dial.stages) json["stages"].push_back(to_string(stage));
   json["settings"] = nlohmann::ordered_json::array();
   for (size_t s = 0; s < dial.settings.size(); ++s) {
     const Measurement& m = measurements[s];
@@ -188,6 +205,8 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
       row["observed_order"] =
           std::log(measurements[s - 1].error.rmse() / m.error.rmse()) / std::log(dial.settings[s - 1].value / dial.settings[s].value);
     }
+    const Summary cost_ms = m.log.stages_ms(dial.stages);
+    row["cost_ms"] = {{"median", cost_ms.median}, {"p90", cost_ms.p90}};
     row["stages_ms"] = m.log.stages_json();
     row["work"] = m.log.work_json();
     json["settings"].push_back(std::move(row));

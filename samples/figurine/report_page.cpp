@@ -28,6 +28,7 @@ p { max-width: 78ch; margin: 6px 0 14px; }
          background: var(--card); border: 1px solid var(--line); border-radius: 8px; }
 .facts dt { font-size: 12.5px; } .facts dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(430px, 1fr)); gap: 18px; }
+.words { padding: 18px 8px; align-self: center; }
 figure { margin: 0; padding: 14px 14px 8px; background: var(--card); border: 1px solid var(--line); border-radius: 8px; }
 figcaption { font-size: 13px; color: var(--soft); padding: 4px 4px 6px; }
 svg { width: 100%; height: auto; display: block; font-family: inherit; }
@@ -67,10 +68,17 @@ std::string fact(const std::string& name, const std::string& value) {
   return "<div><dt>" + escape_html(name) + "</dt><dd>" + escape_html(value) + "</dd></div>\n";
 }
 
+std::string capitalised(std::string text) {
+  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
+  return text;
+}
+
 std::string cell(const std::string& text) { return "<td>" + text + "</td>"; }
 
 std::string plots_of(const Json& dial) {
-  Plot time{.x = {"median time of a frame, ms"}, .y = {"PSNR to the reference, dB"}};
+  std::string stages;
+  for (const Json& stage : dial["stages"]) stages += (stages.empty() ? "" : ", ") + stage.get<std::string>();
+  Plot time{.x = {"median time of " + stages + ", ms"}, .y = {"PSNR to the reference, dB"}};
   Plot work{.x = {"blends a frame", true}, .y = {"PSNR to the reference, dB"}};
   Plot order{.x = {dial["name"].get<std::string>(), true}, .y = {"rms error", true}};
   for (const Json& setting : dial["settings"]) {
@@ -78,7 +86,7 @@ std::string plots_of(const Json& dial) {
     const std::string label = setting["label"];
     const bool is_default = setting["default"];
     const double psnr = setting["psnr_db"];
-    time.points.push_back({setting["stages_ms"]["total"]["median"], psnr, label, is_default});
+    time.points.push_back({setting["cost_ms"]["median"], psnr, label, is_default});
     work.points.push_back({setting["work"]["blends"], psnr, label, is_default});
     order.points.push_back({setting["value"], setting["rmse"], label, is_default});
     if (is_default && dial["theoretical_order"].get<double>() > 0) {
@@ -89,16 +97,24 @@ std::string plots_of(const Json& dial) {
   const auto figure = [](const Plot& plot, const std::string& caption) {
     return "<figure>" + svg_plot(plot) + "<figcaption>" + escape_html(caption) + "</figcaption></figure>\n";
   };
-  return "<div class=\"plots\">\n" + figure(time, "Error over time: up and to the left is better. Times move with the machine's mood.") +
+  return "<div class=\"plots\">\n" +
+         figure(
+             time,
+             "Error over the time of the stages that the dial touches: up and to the left is better. Times move with the machine's mood.") +
          figure(work, "Error over work: blends do not depend on the machine.") +
-         figure(order, "Convergence: the slope is the observed order; dashed, the theoretical one through the default.") + "</div>\n";
+         figure(order, "Convergence: the slope is the observed order; dashed, the theoretical one through the default.") +
+         "<div class=\"words\"><p><b>In theory.</b> " + escape_html(dial["theory"].get<std::string>()) + " Order " +
+         format("%g", dial["theoretical_order"]) + ".</p><p><b>Observed.</b> " +
+         (dial["observed_order"].is_null() ? "No error to speak of."
+                                           : "Order " + format("%.2f", dial["observed_order"]) + ", by least squares over all settings.") +
+         "</p></div>" + "</div>\n";
 }
 
 std::string table_of(const Json& dial) {
-  std::string html = "<table><tr><th>" + escape_html(dial["name"].get<std::string>()) +
-                     "</th><th>PSNR, dB</th><th>rms error</th><th>largest</th><th>observed order</th><th>frame, ms</th><th>p90, "
-                     "ms</th><th>blend stage, ms</th>"
-                     "<th>blends</th><th>pairs</th><th>GMAC</th></tr>\n";
+  std::string html =
+      "<table><tr><th>" + escape_html(dial["name"].get<std::string>()) +
+      "</th><th>PSNR, dB</th><th>rms error</th><th>largest</th><th>observed order</th><th>its stages, ms</th><th>p90, ms</th>"
+      "<th>whole frame, ms</th><th>blends</th><th>pairs</th><th>GMAC</th></tr>\n";
   for (const Json& setting : dial["settings"]) {
     const Json& total = setting["stages_ms"]["total"];
     const Json& work = setting["work"];
@@ -107,8 +123,8 @@ std::string table_of(const Json& dial) {
     html += cell(setting["psnr_db"].is_null() ? "equal" : format("%.2f", setting["psnr_db"]));
     html += cell(format("%.2e", setting["rmse"])) + cell(format("%.2e", setting["largest"]));
     html += cell(setting["observed_order"].is_null() ? "" : format("%.2f", setting["observed_order"]));
-    html += cell(format("%.2f", total["median"])) + cell(format("%.2f", total["p90"]));
-    html += cell(setting["stages_ms"].contains("blend") ? format("%.2f", setting["stages_ms"]["blend"]["median"]) : "");
+    const Json& cost = setting["cost_ms"];
+    html += cell(format("%.2f", cost["median"])) + cell(format("%.2f", cost["p90"])) + cell(format("%.2f", total["median"]));
     html += cell(format("%.0f", work["blends"])) + cell(format("%.0f", work["pairs"])) +
             cell(format("%.3f", work["macs"].get<double>() * 1e-9));
     html += "</tr>\n";
@@ -134,8 +150,8 @@ std::string report_html(const Json& report, const std::vector<ReportPicture>& pi
   html += fact("Arithmetic", text(machine["precision"]) + ", " + text(machine["isa"]) + " kernels");
   html += fact("Made", text(report["date"])) + fact("By", "figurine " + text(report["version"])) + "</dl>\n";
   for (const Json& dial : report["dials"]) {
-    html += "<h2>" + escape_html(text(dial["name"])) + "</h2>\n<p>" + escape_html(text(dial["meaning"])) + ". " +
-            escape_html(text(dial["theory"])) + "</p>\n";
+    html +=
+        "<h2>" + escape_html(capitalised(text(dial["name"]))) + "</h2>\n<p>" + escape_html(capitalised(text(dial["meaning"]))) + ".</p>\n";
     html += plots_of(dial) + table_of(dial);
   }
   if (!pictures.empty()) {

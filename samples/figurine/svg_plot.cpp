@@ -29,11 +29,15 @@ class Scale {
   std::vector<double> ticks() const {
     std::vector<double> result;
     if (logarithmic_) {
-      const bool sparse = high_ - low_ > 2.5;
+      // Decades alone over a wide range, more digits the narrower it is.
+      const double range = high_ - low_;
+      const std::vector<double> digits = range > 2.5   ? std::vector<double>{1}
+                                         : range > 1.2 ? std::vector<double>{1, 2, 5}
+                                                       : std::vector<double>{1, 1.5, 2, 3, 4, 6, 8};
       for (double decade = std::floor(low_); decade <= high_; ++decade) {
-        for (const double digit : {1.0, 2.0, 5.0}) {
+        for (const double digit : digits) {
           const double value = decade + std::log10(digit);
-          if ((digit == 1 || !sparse) && value >= low_ && value <= high_) result.push_back(std::pow(10, value));
+          if (value >= low_ && value <= high_) result.push_back(std::pow(10, value));
         }
       }
       return result;

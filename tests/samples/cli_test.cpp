@@ -6,6 +6,8 @@
 
 #include "ports/linux/pfm.h"
 #include "ports/linux/png.h"
+#include "runtime/test_packages.h"
+#include "samples/figurine/camera_spec.h"
 #include "samples/figurine/image_error.h"
 #include "samples/ply_text.h"
 #include "samples/program.h"
@@ -282,6 +284,41 @@ TEST_F(Cli, ReportPlotsTheAlphaCut) {
   EXPECT_NE(html.find("<svg"), std::string::npos);
   EXPECT_EQ(html.find("http"), std::string::npos) << "the page must not reach for the network";
   EXPECT_EQ(html.find("<script"), std::string::npos);
+}
+
+// The golden picture is this renderer's own here; what is tested is the comparison. Trainer against device: tests/parity.
+TEST_F(Cli, SelftestTellsTheRightPictureFromWrongOnes) {
+  std::filesystem::copy(packages_->path("body.fgn"), folder_.path("body.fgn"));
+  const SyntheticAvatar avatar = make_test_avatar(make_test_body());
+  const std::array<float, 3> grey = avatar.package->avatar().golden.background;
+  folder_.write("camera.json", samples::camera_json(avatar.package->avatar().golden.camera).dump());
+  const std::string background = std::to_string(grey[0]) + "," + std::to_string(grey[1]) + "," + std::to_string(grey[2]);
+  ASSERT_EQ(run("render P/avatar.fgn --camera camera.json --background " + background + " -o golden.png").exit_code, 0);
+  write_golden_avatar(folder_, "right.fgn", folder_.read("golden.png"));
+  const ProgramRun right = run("selftest right.fgn --json");
+  EXPECT_EQ(right.exit_code, 0) << right.err;
+  EXPECT_TRUE(Json::parse(right.out)["passed"].get<bool>());
+  EXPECT_TRUE(Json::parse(right.out)["psnr_db"].is_null()) << "equal to the bit";
+  EXPECT_GT(Json::parse(right.out)["foreground_pixels"], 20);
+
+  ImageU8 picture = png("golden.png");
+  const auto expect_failed = [&](const ImageU8& wrong, const char* what) {
+    const std::vector<std::byte> bytes = *ports::encode_png(wrong);
+    write_golden_avatar(folder_, "wrong.fgn", std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+    const ProgramRun result = run("selftest wrong.fgn --json");
+    EXPECT_EQ(result.exit_code, 1) << what;
+    EXPECT_EQ(result.error_lines(), 1u) << what;
+    EXPECT_FALSE(Json::parse(result.out)["passed"].get<bool>()) << what;
+  };
+  ImageU8 brighter = picture;
+  for (uint8_t& value : brighter.pixels) value = static_cast<uint8_t>(std::min(255, value + 2));  // 42 dB
+  expect_failed(brighter, "brighter by two levels");
+  ImageU8 moved = picture;
+  std::copy(picture.pixels.begin(), picture.pixels.end() - 3, moved.pixels.begin() + 3);
+  expect_failed(moved, "moved by a pixel");
+
+  write_golden_avatar(folder_, "none.fgn", "");
+  EXPECT_NE(run("selftest none.fgn").err.find("golden frame"), std::string::npos);
 }
 
 TEST_F(Cli, RenderJsonHasWhatTheDemoNeeds) {

@@ -80,6 +80,16 @@ ProgramRun run_shell(const std::string& command, const TestFolder& folder) {
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), streams.read("out"), streams.read("err")};
 }
 
+void write_golden_avatar(const TestFolder& folder, const std::string& name, const std::string& png) {
+  const SyntheticBody body = make_test_body();
+  const SyntheticAvatar synthetic = make_test_avatar(body);
+  Avatar avatar = synthetic.package->avatar();
+  avatar.golden.png = {reinterpret_cast<const uint8_t*>(png.data()), png.size()};
+  const Result<std::vector<std::byte>> bytes = write_package(avatar, synthetic.package->budget(), synthetic.package->provenance());
+  FIG_CHECK(bytes.ok(), bytes.status().message().c_str());
+  write_file(folder.path(name), *bytes);
+}
+
 void write_test_packages(const TestFolder& folder) {
   const SyntheticBody body = make_test_body();
   const SyntheticBody other = make_test_body({.seed = 2});

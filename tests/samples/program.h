@@ -40,6 +40,9 @@ struct RunOptions {
 ProgramRun run_figurine(const std::string& arguments, const RunOptions& options = {});
 ProgramRun run_shell(const std::string& command, const TestFolder& folder);
 
+// The avatar of write_test_packages with a golden picture in it, an 8-bit RGB PNG of its golden camera; empty: none.
+void write_golden_avatar(const TestFolder& folder, const std::string& name, const std::string& png);
+
 // Writes body.fgn, avatar.fgn, motion.fgn (12 frames, 30 a second) and other_body.fgn, which does not fit the avatar.
 void write_test_packages(const TestFolder& folder);
 
