@@ -18,26 +18,65 @@ struct ChunkSums {
   uint64_t foreground = 0;
 };
 
-// Partial sums that vectorise without reordering what the compiler may not: 512 values of order one in each, so float keeps five digits.
+// Partial sums by lane vectorise without reordering what the compiler may not. 512 values of order one in each, so float keeps five digits.
 constexpr uint32_t kLanes = 16;
-using Lanes = std::array<float, kLanes>;
 
-template <class Add>
-inline void add_by_lane(uint32_t begin, uint32_t end, Add&& add) {
-  uint32_t i = begin;
-  for (; i + kLanes <= end; i += kLanes) {
-    for (uint32_t lane = 0; lane < kLanes; ++lane) add(i + lane, lane);
-  }
-  for (; i < end; ++i) add(i, 0);
-}
-
-double total(const Lanes& lanes) {
+double total(const float* lanes) {
   double sum = 0;
-  for (float value : lanes) sum += double(value);
+  for (uint32_t lane = 0; lane < kLanes; ++lane) sum += double(lanes[lane]);
   return sum;
 }
 
-float sign(float value) { return value > 0 ? 1.0f : value < 0 ? -1.0f : 0.0f; }
+// One channel of `count` pixels (a multiple of kLanes): both images over the background, and the sums of their differences.
+void compose(uint32_t count, float background, const float* __restrict a, const float* __restrict b, const float* __restrict alpha,
+             const float* __restrict mask, float* __restrict x, float* __restrict y, float* __restrict l1_lanes,
+             float* __restrict squared_lanes) {
+  float l1[kLanes] = {}, squared[kLanes] = {};
+  for (uint32_t i = 0; i < count; i += kLanes) {
+    for (uint32_t lane = 0; lane < kLanes; ++lane) {
+      const uint32_t at = i + lane;
+      const float seen = a[at] + (1 - alpha[at]) * background, truth = b[at] + (1 - mask[at]) * background, difference = seen - truth;
+      x[at] = seen;
+      y[at] = truth;
+      l1[lane] += std::fabs(difference);
+      squared[lane] += mask[at] > 0.5f ? difference * difference : 0.0f;
+    }
+  }
+  for (uint32_t lane = 0; lane < kLanes; ++lane) l1_lanes[lane] += l1[lane], squared_lanes[lane] += squared[lane];
+}
+
+void compare_masks(uint32_t count, const float* __restrict alpha, const float* __restrict mask, float* __restrict l1_lanes,
+                   float* __restrict inside_lanes) {
+  float l1[kLanes] = {}, inside[kLanes] = {};
+  for (uint32_t i = 0; i < count; i += kLanes) {
+    for (uint32_t lane = 0; lane < kLanes; ++lane) {
+      l1[lane] += std::fabs(alpha[i + lane] - mask[i + lane]);
+      inside[lane] += mask[i + lane] > 0.5f ? 1.0f : 0.0f;
+    }
+  }
+  for (uint32_t lane = 0; lane < kLanes; ++lane) l1_lanes[lane] += l1[lane], inside_lanes[lane] += inside[lane];
+}
+
+inline float sign(float value) { return float(value > 0) - float(value < 0); }
+
+struct GradientScales {
+  float l1 = 0, ssim = 0, mask = 0;
+};
+
+void mask_gradient(uint32_t count, float scale, const float* __restrict alpha, const float* __restrict mask, float* __restrict d_alpha) {
+  for (uint32_t i = 0; i < count; ++i) d_alpha[i] = scale * sign(alpha[i] - mask[i]);
+}
+
+// One channel's gradient; adds its share of the alpha's, through the background.
+void colour_gradient(uint32_t count, const GradientScales& scales, float background, const float* __restrict x, const float* __restrict y,
+                     const float* __restrict by_ssim, float* __restrict gradient, float* __restrict d_alpha) {
+  const float l1 = scales.l1, ssim = scales.ssim;
+  for (uint32_t i = 0; i < count; ++i) {
+    const float d = l1 * sign(x[i] - y[i]) - ssim * by_ssim[i];
+    gradient[i] = d;
+    d_alpha[i] -= background * d;
+  }
+}
 
 // The loss and its gradient by the image, in one go: the gradient is always wanted in training.
 struct Computed {
@@ -66,21 +105,22 @@ Computed compute(const torch::Tensor& image, const torch::Tensor& target, const 
   parallel_for(options.threads, chunks, [&](uint32_t chunk) {
     const uint32_t begin = chunk * kChunk, end = std::min(pixels, begin + kChunk);
     const float *alpha = a + size_t(3) * pixels, *mask = b + size_t(3) * pixels;
-    Lanes l1{}, squared{}, mask_l1{}, inside{};
+    float l1[kLanes] = {}, squared[kLanes] = {}, mask_l1[kLanes] = {}, inside[kLanes] = {};
+    // What does not fill the lanes is copied into buffers that do; zeros are equal in both images.
+    const uint32_t whole = (end - begin) / kLanes * kLanes, tail = end - begin - whole;
+    float tails[6][kLanes] = {};
     for (uint32_t c = 0; c < 3; ++c) {
-      const size_t plane = size_t(c) * pixels;
-      add_by_lane(begin, end, [&](uint32_t i, uint32_t lane) {
-        x[plane + i] = a[plane + i] + (1 - alpha[i]) * background[c];
-        y[plane + i] = b[plane + i] + (1 - mask[i]) * background[c];
-        const float difference = x[plane + i] - y[plane + i];
-        l1[lane] += std::fabs(difference);
-        squared[lane] += mask[i] > 0.5f ? difference * difference : 0.0f;
-      });
+      const size_t at = size_t(c) * pixels + begin;
+      compose(whole, background[c], a + at, b + at, alpha + begin, mask + begin, x + at, y + at, l1, squared);
+      if (tail == 0) continue;
+      const float* const from[4] = {a + at + whole, b + at + whole, alpha + begin + whole, mask + begin + whole};
+      for (int k = 0; k < 4; ++k) std::copy_n(from[k], tail, tails[k]);
+      compose(kLanes, background[c], tails[0], tails[1], tails[2], tails[3], tails[4], tails[5], l1, squared);
+      std::copy_n(tails[4], tail, x + at + whole);
+      std::copy_n(tails[5], tail, y + at + whole);
     }
-    add_by_lane(begin, end, [&](uint32_t i, uint32_t lane) {
-      mask_l1[lane] += std::fabs(alpha[i] - mask[i]);
-      inside[lane] += mask[i] > 0.5f ? 1.0f : 0.0f;
-    });
+    compare_masks(whole, alpha + begin, mask + begin, mask_l1, inside);
+    if (tail != 0) compare_masks(kLanes, tails[2], tails[3], mask_l1, inside);
     sums[chunk] = {total(l1), total(mask_l1), total(squared), static_cast<uint64_t>(total(inside))};
   });
   for (const ChunkSums& sum : sums) {
@@ -91,26 +131,23 @@ Computed compute(const torch::Tensor& image, const torch::Tensor& target, const 
   }
   const bool with_ssim = options.ssim_weight != 0;
   result.terms.ssim = 1;
+  ssim_gradient.resize(size_t(3) * pixels);
   if (with_ssim) {
-    ssim_gradient.resize(size_t(3) * pixels);
     result.terms.ssim = static_cast<float>(ssim<float>({x, y, 3, height, width}, options.threads, scratch, ssim_gradient.data()));
+  } else {
+    std::fill(ssim_gradient.begin(), ssim_gradient.end(), 0.0f);
   }
-  const float l1_scale = options.l1_weight / (3.0f * static_cast<float>(pixels)),
-              mask_scale = options.mask_weight / static_cast<float>(pixels);
+  const GradientScales scales{.l1 = options.l1_weight / (3.0f * static_cast<float>(pixels)),
+                              .ssim = options.ssim_weight,
+                              .mask = options.mask_weight / static_cast<float>(pixels)};
   const float* const by_ssim = ssim_gradient.data();
   parallel_for(options.threads, chunks, [&](uint32_t chunk) {
-    const uint32_t begin = chunk * kChunk, end = std::min(pixels, begin + kChunk);
-    const float *alpha = a + size_t(3) * pixels, *mask = b + size_t(3) * pixels;
-    float* const d_alpha = gradient + size_t(3) * pixels;
-    for (uint32_t i = begin; i < end; ++i) d_alpha[i] = mask_scale * sign(alpha[i] - mask[i]);
+    const uint32_t begin = chunk * kChunk, count = std::min(pixels, begin + kChunk) - begin;
+    const size_t alpha = size_t(3) * pixels + begin;
+    mask_gradient(count, scales.mask, a + alpha, b + alpha, gradient + alpha);
     for (uint32_t c = 0; c < 3; ++c) {
-      const size_t plane = size_t(c) * pixels;
-      for (uint32_t i = begin; i < end; ++i) {
-        float d = l1_scale * sign(x[plane + i] - y[plane + i]);
-        if (with_ssim) d -= options.ssim_weight * by_ssim[plane + i];
-        gradient[plane + i] = d;
-        d_alpha[i] -= background[c] * d;
-      }
+      const size_t at = size_t(c) * pixels + begin;
+      colour_gradient(count, scales, background[c], x + at, y + at, by_ssim + at, gradient + at, gradient + alpha);
     }
   });
   result.terms.total =

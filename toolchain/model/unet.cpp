@@ -77,8 +77,9 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
           const torch::ScalarType type = plan->type_of(i);
           const ConvolutionSlot& slot = plan->slots[i];
           extra[i] = UNetPlan::kernel_of(flat, slot).to(type);
-          out = at::convolution(a.to(type), extra[i], UNetPlan::bias_of(flat, slot).to(type), {1, 1}, padding(slot), {1, 1}, false, {0, 0},
-                                1);
+          out = unbatched(at::convolution(batched(a.to(type), slot), extra[i], UNetPlan::bias_of(flat, slot).to(type), {1, 1},
+                                          padding(slot), {1, 1}, false, {0, 0}, 1),
+                          a);
           if (layers[i].relu) out.relu_();
           break;
         }
