@@ -36,7 +36,6 @@ double ssim(const PlanarImages<Scalar>& images, uint32_t threads, SsimScratch<Sc
   if (values == 0) return 1;
   double weights[kSsimTaps], sum = 0;
   for (uint32_t k = 0; k < kSsimTaps; ++k) sum += weights[k] = std::exp(-0.5 * std::pow((double(k) - kSsimRadius) / 1.5, 2));
-  if (gradient) scratch.derivatives.resize(3 * values);
   const uint32_t tiles_x = (images.width + kSsimTileColumns - 1) / kSsimTileColumns,
                  tiles_y = (images.height + kSsimTileRows - 1) / kSsimTileRows;
   const uint32_t tiles = tiles_x * tiles_y * images.channels;
@@ -55,24 +54,13 @@ double ssim(const PlanarImages<Scalar>& images, uint32_t threads, SsimScratch<Sc
                           .window = {},
                           .c1 = Scalar(0.01 * 0.01),
                           .c2 = Scalar(0.03 * 0.03),
-                          .d_mean = nullptr,
-                          .d_square = nullptr,
-                          .d_cross = nullptr};
+                          .gradient = gradient ? gradient + channel * plane : nullptr,
+                          .scale = Scalar(1.0 / static_cast<double>(values))};
     for (uint32_t k = 0; k < kSsimTaps; ++k) tile.window[k] = Scalar(weights[k] / sum);
-    if (gradient) {
-      tile.d_mean = scratch.derivatives.data() + channel * plane;
-      tile.d_square = tile.d_mean + values;
-      tile.d_cross = tile.d_square + values;
-    }
     return tile;
   };
   const SsimKernels<Scalar>& kernel = kernels<Scalar>();
-  parallel_for(threads, tiles, [&](uint32_t i) { scratch.tile_sums[i] = kernel.forward_tile(tile_at(i)); });
-  if (gradient) {
-    const Scalar scale = Scalar(1.0 / static_cast<double>(values));
-    parallel_for(threads, tiles,
-                 [&](uint32_t i) { kernel.backward_tile(tile_at(i), scale, gradient + (i / (tiles_x * tiles_y)) * plane); });
-  }
+  parallel_for(threads, tiles, [&](uint32_t i) { scratch.tile_sums[i] = kernel.tile(tile_at(i)); });
   double total = 0;
   for (Scalar value : scratch.tile_sums) total += double(value);
   return total / static_cast<double>(values);

@@ -16,10 +16,9 @@ struct PlanarImages {
   uint32_t channels = 0, height = 0, width = 0;
 };
 
-// Scratch that is reused from call to call: three derivative maps.
+// Scratch that is reused from call to call.
 template <class Scalar>
 struct SsimScratch {
-  std::vector<Scalar> derivatives;
   std::vector<Scalar> tile_sums;
 };
 

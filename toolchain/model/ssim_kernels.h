@@ -8,7 +8,7 @@ namespace figurine::model {
 inline constexpr uint32_t kSsimTaps = 11;
 inline constexpr uint32_t kSsimRadius = 5;
 inline constexpr uint32_t kSsimTileColumns = 64;
-inline constexpr uint32_t kSsimTileRows = 96;
+inline constexpr uint32_t kSsimTileRows = 128;
 
 template <class Scalar>
 struct SsimTile {
@@ -18,15 +18,13 @@ struct SsimTile {
   uint32_t columns, rows;    // pixels of the tile, at most kSsimTileColumns x kSsimTileRows
   Scalar window[kSsimTaps];  // 1-D weights, sum 1
   Scalar c1, c2;
-  // d(SSIM of a pixel)/d(mean of x, mean of x^2, mean of xy) there, planes of the same size; written forward, read backward.
-  Scalar *d_mean, *d_square, *d_cross;
+  Scalar* gradient;  // plane of the same size, or null: scale d(sum of SSIM over the whole plane)/dx is written at the tile's pixels
+  Scalar scale;
 };
 
 template <class Scalar>
 struct SsimKernels {
-  Scalar (*forward_tile)(const SsimTile<Scalar>& tile);  // the sum of SSIM over the tile's pixels
-  // gradient = scale d(sum of SSIM)/dx over the tile's pixels; reads the derivative planes around the tile.
-  void (*backward_tile)(const SsimTile<Scalar>& tile, Scalar scale, Scalar* gradient);
+  Scalar (*tile)(const SsimTile<Scalar>& tile);  // the sum of SSIM over the tile's pixels
 };
 
 namespace generic {

@@ -14,6 +14,7 @@
 
 #include "tests/toolchain/model/synthetic_body.h"
 #include "toolchain/model/adamw.h"
+#include "toolchain/model/allocator.h"
 #include "toolchain/model/head.h"
 #include "toolchain/model/loss.h"
 #include "toolchain/model/render.h"
@@ -46,6 +47,7 @@ struct Row {
 int main(int argc, char** argv) {
   const uint32_t threads = argc > 1 ? static_cast<uint32_t>(std::atoi(argv[1])) : 2;
   const int rounds = argc > 2 ? std::atoi(argv[2]) : 30;
+  keep_freed_memory();
   const testing::SyntheticBody capsule(128, 77);
   const std::vector<Affine> transforms = capsule.bent();
   Camera camera = *make_orbit_camera(
