@@ -69,7 +69,8 @@ TEST(Pack, SaysWhatADeviceNeedsToKnow) {
   size_t different = 0;
   for (uint8_t value : golden->pixels) different += value < 120 || value > 136;
   EXPECT_GT(different, golden->pixels.size() / 50);
-  EXPECT_GT(measure_memory(file.package, body.package, {avatar.golden.root_translation_m, avatar.golden.rotations}, avatar.golden.camera), 10000u);
+  EXPECT_GT(measure_memory(file.package, body.package, {avatar.golden.root_translation_m, avatar.golden.rotations}, avatar.golden.camera),
+            10000u);
 }
 
 TEST(Pack, IsTheSameBytesTwice) {

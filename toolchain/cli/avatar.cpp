@@ -48,7 +48,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   if (arguments.seed) settings.seed = *arguments.seed;
   if (arguments.init) settings.init = *arguments.init;
   if (arguments.learning_rate) settings.schedule.peak = *arguments.learning_rate;
-  if (arguments.weight_decay) settings.adamw.weight_decay = *arguments.weight_decay;
+  if (arguments.weight_decay) settings.weight_decay = *arguments.weight_decay;
   if (arguments.warmup) settings.warmup_iterations = *arguments.warmup;
   if (arguments.iterations) settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
   if (arguments.minutes) settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};

@@ -101,7 +101,7 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar, const Recon
         last = Before{frame, prediction, truth};
       }
     }
-    progress.show({.iteration = frame + 1, .fraction = double(frame + 1) / double(frames)});
+    progress.show(double(frame + 1) / double(frames), "frame " + std::to_string(frame + 1) + " of " + std::to_string(frames));
   }
   if (groups.empty()) throw InputError(data.directory() + ": nothing is held out, so there is nothing to evaluate");
   nlohmann::json report = nlohmann::json::object();

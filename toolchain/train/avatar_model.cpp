@@ -12,7 +12,8 @@ AvatarModel::AvatarModel(const Body& body, std::vector<float> shape, const Train
       shape_(settings.template_mode == TemplateMode::kShaped ? shape : std::vector<float>{}),
       joint_position_m_(body.joint_position_m.size()),
       texel_position_m_(body.texel_position_m.size()),
-      unet_(make_network(settings), {.precision = bf16 ? model::Precision::kBfloat16 : model::Precision::kFloat32, .seed = kInitialWeightsSeed}),
+      unet_(make_network(settings),
+            {.precision = bf16 ? model::Precision::kBfloat16 : model::Precision::kFloat32, .seed = kInitialWeightsSeed}),
       renderer_({.threads = settings.threads}) {
   const Preset& preset = find_preset(settings.preset);
   if (body.uv_size != preset.uv_size) {

@@ -37,20 +37,26 @@ Progress::~Progress() {
   if (open_line_) std::fputc('\n', stderr);
 }
 
-void Progress::show(const ProgressLine& line) {
-  const double now = now_s();
-  if (quiet_ || now - last_shown_s_ < (terminal_ ? kTerminalPeriod_s : kPlainPeriod_s)) return;
-  last_shown_s_ = now;
+bool Progress::due() const { return !quiet_ && now_s() - last_shown_s_ >= (terminal_ ? kTerminalPeriod_s : kPlainPeriod_s); }
+
+void Progress::show(double fraction, const TrainingLine& line) {
+  if (!due()) return;
   char text[256];
   std::snprintf(text, sizeof(text), "%llu  loss %.4f  PSNR %.2f dB  %.1f it/s  %s left", static_cast<unsigned long long>(line.iteration),
                 line.loss, line.psnr_db, line.iterations_per_second, format_duration(line.seconds_left).c_str());
+  show(fraction, std::string(text));
+}
+
+void Progress::show(double fraction, const std::string& text) {
+  if (!due()) return;
+  last_shown_s_ = now_s();
   if (!terminal_) {
-    std::fprintf(stderr, "%s: %3.0f %%  %s\n", title_.c_str(), 100 * line.fraction, text);
+    std::fprintf(stderr, "%s: %3.0f %%  %s\n", title_.c_str(), 100 * fraction, text.c_str());
     return;
   }
   std::string bar(kBarCells, '.');
-  for (int i = 0; i < kBarCells && i < line.fraction * kBarCells; ++i) bar[i] = '#';
-  std::fprintf(stderr, "\r%s [%s] %3.0f %%  %s\x1b[K", title_.c_str(), bar.c_str(), 100 * line.fraction, text);
+  for (int i = 0; i < kBarCells && i < fraction * kBarCells; ++i) bar[static_cast<size_t>(i)] = '#';
+  std::fprintf(stderr, "\r%s [%s] %3.0f %%  %s\x1b[K", title_.c_str(), bar.c_str(), 100 * fraction, text.c_str());
   std::fflush(stderr);
   open_line_ = true;
 }

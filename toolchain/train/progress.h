@@ -6,10 +6,9 @@
 
 namespace figurine::train {
 
-struct ProgressLine {
+struct TrainingLine {
   uint64_t iteration = 0;
-  double fraction = 0;  // of the budget, in [0,1]
-  double loss = 0;      // running means
+  double loss = 0;  // running means
   double psnr_db = 0;
   double iterations_per_second = 0;
   double seconds_left = 0;
@@ -24,12 +23,15 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  // Called as often as the caller likes; prints a few times a second at most.
-  void show(const ProgressLine& line);
+  // fraction: of the work, in [0,1]. Called as often as the caller likes; prints a few times a second at most.
+  void show(double fraction, const TrainingLine& line);
+  void show(double fraction, const std::string& text);
   // A line of its own, above the bar.
   void say(const std::string& text);
 
  private:
+  bool due() const;
+
   std::string title_;
   bool quiet_;
   bool terminal_;

@@ -1,6 +1,7 @@
 #include "toolchain/train/trainer.h"
 
 #include <ATen/Parallel.h>
+#include <malloc.h>
 
 #include <chrono>
 #include <cmath>
@@ -65,7 +66,8 @@ class Trainer {
         description_(std::move(description)),
         model_(body.package.body(), data.shape(), settings, settings.bf16),
         optimiser_(model_.unet().parameter_count(),
-                   {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {}
+                   {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {
+  }
 
   TrainResult run() {
     start();
@@ -305,6 +307,9 @@ TrainResult train_avatar(const TrainRequest& request) {
     if (error) throw InputError(request.run + ": cannot be created: " + error.message());
   }
   at::set_num_threads(static_cast<int>(settings.threads));
+  // Activations come and go every iteration: glibc's default gives them back to the system each time, and their pages fault in anew.
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
   return Trainer(request, settings, body, data, std::move(description)).run();
 }
 

@@ -1,5 +1,5 @@
-// A small real capture for tests of the trainer: the mannequin, swinging, from 8 cameras at 128x128, with a body package at T = 32. Made once per program,
-// about two seconds, in a folder that is removed at the end.
+// A small real capture for tests of the trainer: the mannequin, swinging, from 8 cameras at 128x128, with a body package at T = 32. Made
+// once per program, about two seconds, in a folder that is removed at the end.
 #pragma once
 
 #include <cmath>
@@ -64,7 +64,8 @@ struct SmallCapture {
       clip.root_translation_m.insert(clip.root_translation_m.end(), {0, 0, 0});
       for (uint32_t j = 0; j < body::kJointCount; ++j) {
         const double angle = 0.25 * std::sin(0.2 * f + 1.7 * j);
-        clip.rotations.insert(clip.rotations.end(), {static_cast<float>(std::cos(angle / 2)), static_cast<float>(std::sin(angle / 2)), 0, 0});
+        clip.rotations.insert(clip.rotations.end(),
+                              {static_cast<float>(std::cos(angle / 2)), static_cast<float>(std::sin(angle / 2)), 0, 0});
       }
     }
     return clip;

@@ -1,4 +1,5 @@
-// Training itself, at the smallest size that shows anything: it beats a flat colour, a resumed run equals an uninterrupted one, bad input is refused.
+// Training itself, at the smallest size that shows anything: it beats a flat colour, a resumed run equals an uninterrupted one, bad input
+// is refused.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -21,7 +22,8 @@ using testing_tools::small_capture;
 using testing_tools::TemporaryFolder;
 
 TrainRequest request(const std::string& run, uint64_t iterations) {
-  TrainRequest request{.data = small_capture().data, .body = small_capture().body, .run = run, .settings = preset_settings("nano"), .quiet = true};
+  TrainRequest request{
+      .data = small_capture().data, .body = small_capture().body, .run = run, .settings = preset_settings("nano"), .quiet = true};
   request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
   request.settings.threads = 2;
   return request;
@@ -108,7 +110,8 @@ TEST(Training, WithFrozenPoseSeesOneInputPerRootOrientation) {
   EXPECT_FALSE(torch::equal(moving.pose(a.view()).input, moving.pose(b.view()).input));
   // The Gaussians are skinned with the true pose all the same.
   const PosedBody posed_frozen = frozen.pose(b.view()), posed_moving = moving.pose(b.view());
-  for (size_t j = 0; j < posed_frozen.world_from_rest.size(); ++j) EXPECT_EQ(posed_frozen.world_from_rest[j].m, posed_moving.world_from_rest[j].m);
+  for (size_t j = 0; j < posed_frozen.world_from_rest.size(); ++j)
+    EXPECT_EQ(posed_frozen.world_from_rest[j].m, posed_moving.world_from_rest[j].m);
   // Turning the root turns the input.
   b.rotations[0] = 0, b.rotations[1] = 0, b.rotations[2] = 1, b.rotations[3] = 0;
   EXPECT_FALSE(torch::equal(frozen.pose(a.view()).input, frozen.pose(b.view()).input));
