@@ -25,9 +25,6 @@ if(FIGURINE_SANITIZE)
   add_compile_options(-O1 -fsanitize=${FIGURINE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${FIGURINE_SANITIZE})
 endif()
-if(FIGURINE_SCALAR)
-  add_compile_options(-fno-tree-vectorize -fno-tree-slp-vectorize)
-endif()
 
 # figurine_test(NAME SOURCES... LIBRARIES...): a GoogleTest program, one ctest entry. Running no test is a failure.
 function(figurine_test name)
