@@ -91,15 +91,14 @@ class Trainer {
       record(result, rate);
       done = train::progress(settings_.schedule.budget, state_.iteration, state_.seconds);
       const double speed = static_cast<double>(state_.iteration - session_first) / std::max(1e-9, state_.seconds - session_start);
-      progress.show(
-          {.iteration = state_.iteration,
-           .fraction = done,
-           .loss = shown_loss_,
-           .psnr_db = shown_psnr(),
-           .iterations_per_second = speed,
-           .seconds_left = settings_.schedule.budget.iterations > 0
-                               ? static_cast<double>(settings_.schedule.budget.iterations - state_.iteration) / std::max(1e-9, speed)
-                               : settings_.schedule.budget.seconds - state_.seconds});
+      const double seconds_left = settings_.schedule.budget.iterations > 0
+                                      ? static_cast<double>(settings_.schedule.budget.iterations - state_.iteration) / std::max(1e-9, speed)
+                                      : settings_.schedule.budget.seconds - state_.seconds;
+      progress.show(done, TrainingLine{.iteration = state_.iteration,
+                                       .loss = shown_loss_,
+                                       .psnr_db = shown_psnr(),
+                                       .iterations_per_second = speed,
+                                       .seconds_left = seconds_left});
       if (now_s() - last_checkpoint > request_.checkpoint_period_s && done < 1) {
         save("running");
         last_checkpoint = now_s();

@@ -27,7 +27,9 @@ inline constexpr float kDilationPx2 = 0.3f;        // added to the diagonal of t
 inline constexpr float kAlphaCut = 1.0f / 255.0f;  // contributions with alpha below it are skipped
 inline constexpr float kAlphaMax = 0.99f;
 inline constexpr float kTransmittanceStop = 1e-4f;  // a pixel stops before the contribution that would take T below it
-inline constexpr float kFrustumClamp = 1.3f;        // x/z and y/z in the Jacobian are clamped to 1.3 tan(fov/2) (around the principal ray, see numerics.md)
+// x/z and y/z in the Jacobian are clamped to the image's own range, widened on either side by (1.3 - 1) / 2 of its size: for a centred principal point this
+// is the original's 1.3 tan(fov/2).
+inline constexpr float kFrustumClamp = 1.3f;
 
 // Gaussians in world space, borrowed arrays of length n. The covariance is F F^T for the factor F = A R S, so that determinants can be formed
 // from minors without cancellation.
