@@ -7,7 +7,8 @@ namespace figurine {
 
 void shape_body(const Body& body, std::span<const float> shape, std::span<float> joint_position_m, std::span<float> texel_position_m) {
   FIG_CHECK(shape.size() <= body.shape_count(), "more shape coefficients than the body has directions");
-  FIG_CHECK(joint_position_m.size() == body.joint_position_m.size() && texel_position_m.size() == body.texel_position_m.size(), "array sizes");
+  FIG_CHECK(joint_position_m.size() == body.joint_position_m.size() && texel_position_m.size() == body.texel_position_m.size(),
+            "array sizes");
   const auto add = [&](std::span<const float> mean, std::span<const float> basis, std::span<float> out) {
     std::memcpy(out.data(), mean.data(), mean.size_bytes());
     for (size_t s = 0; s < shape.size(); ++s) {
@@ -29,7 +30,8 @@ void draw_pose_maps(const Body& body, const PoseView& pose, const MapStatistics&
     for (uint32_t c = 0; c < kMapChannels; ++c) maps[t * stride + c] = 0;
   }
   for (uint32_t i = 0; i < body.texel_count(); ++i) {
-    const Affine transform = blend(scratch, &body.texel_joints[size_t(i) * kSkinInfluences], &body.texel_weights[size_t(i) * kSkinInfluences]);
+    const Affine transform =
+        blend(scratch, &body.texel_joints[size_t(i) * kSkinInfluences], &body.texel_weights[size_t(i) * kSkinInfluences]);
     const std::array<float, 3> position = transform_point(transform, &body.texel_position_m[size_t(i) * 3]);
     const std::array<float, 3> normal = transform_normal(transform, &body.texel_normal[size_t(i) * 3]);
     float* out = &maps[size_t(body.texel[i]) * stride];

@@ -47,7 +47,8 @@ Result<Camera> make_orbit_camera(const OrbitCamera& orbit, uint32_t width_px, ui
   if (!std::isfinite(orbit.azimuth_deg)) return invalid("orbit azimuth must be finite");
   if (!(std::abs(orbit.elevation_deg) <= 89)) return invalid("orbit elevation must be within -89 and 89 degrees");
   if (!(orbit.distance_m > 0) || !std::isfinite(orbit.distance_m)) return invalid("orbit distance must be positive and finite");
-  if (!(orbit.vertical_fov_deg >= 1 && orbit.vertical_fov_deg <= 170)) return invalid("orbit field of view must be within 1 and 170 degrees");
+  if (!(orbit.vertical_fov_deg >= 1 && orbit.vertical_fov_deg <= 170))
+    return invalid("orbit field of view must be within 1 and 170 degrees");
   const double azimuth = orbit.azimuth_deg * kPi / 180, elevation = orbit.elevation_deg * kPi / 180;
   // Unit vector from target to camera; forward is its opposite. right = forward x up; down completes the OpenCV frame.
   const double from_target[3] = {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};

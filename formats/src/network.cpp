@@ -6,7 +6,9 @@ namespace figurine {
 
 namespace {
 
-Status corrupt(size_t layer, const char* what) { return Status(StatusCode::kCorrupt, "network: layer " + std::to_string(layer) + ": " + what); }
+Status corrupt(size_t layer, const char* what) {
+  return Status(StatusCode::kCorrupt, "network: layer " + std::to_string(layer) + ": " + what);
+}
 
 uint64_t weight_count(const Layer& layer, const ValueShape& input) {
   return uint64_t(layer.out_channels) * layer.kernel * layer.kernel * input.channels;
@@ -18,7 +20,8 @@ Result<std::vector<ValueShape>> infer_shapes(const Network& network, bool check_
   if (network.input_size < 1 || network.input_size > 4096 || network.input_channels < 1 || network.input_channels > kMaxChannels) {
     return Status(StatusCode::kCorrupt, "network: input size or channels out of range");
   }
-  if (network.layers.empty() || network.layers.size() > kMaxLayers) return Status(StatusCode::kCorrupt, "network: number of layers out of range");
+  if (network.layers.empty() || network.layers.size() > kMaxLayers)
+    return Status(StatusCode::kCorrupt, "network: number of layers out of range");
   std::vector<ValueShape> shapes{{network.input_size, network.input_channels}};
   for (size_t i = 0; i < network.layers.size(); ++i) {
     const Layer& layer = network.layers[i];
@@ -48,7 +51,8 @@ Result<std::vector<ValueShape>> infer_shapes(const Network& network, bool check_
         shapes.push_back({a.size, a.channels + b.channels});
         break;
       }
-      default: return corrupt(i, "unknown operator");
+      default:
+        return corrupt(i, "unknown operator");
     }
   }
   return shapes;

@@ -49,8 +49,8 @@ std::array<float, 9> rotation_from_quaternion(const float* wxyz) {
   const float a = wxyz[0] / largest, b = wxyz[1] / largest, c = wxyz[2] / largest, d = wxyz[3] / largest;
   const float inverse = 1.0f / std::sqrt(a * a + b * b + c * c + d * d);
   const float w = a * inverse, x = b * inverse, y = c * inverse, z = d * inverse;
-  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),      //
-          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),      //
+  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),  //
+          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),  //
           2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 

@@ -27,8 +27,8 @@ struct HeadDecoding {
   uint32_t sh_degree = 0;
 };
 
-// Mean and covariance of the training poses' body rotations, for telling how unusual a pose is: features are rotation vectors (axis times angle,
-// radians) of the listed joints, concatenated.
+// Mean and covariance of the training poses' body rotations, for telling how unusual a pose is: features are rotation vectors (axis times
+// angle, radians) of the listed joints, concatenated.
 struct PoseStatistics {
   std::vector<uint8_t> joints;        // [P]
   std::span<const float> mean;        // [3P]

@@ -1,7 +1,8 @@
 // A body at one UV resolution T: joints, and per covered texel its canonical place, normal, skin weights and shape directions. Not a mesh.
 //
-// Letters: J joints, S shape coefficients, N covered texels, T texels a side, K = kSkinInfluences. "Covered" texels carry a Gaussian each; "border"
-// texels are the two-texel dilation around the charts, which only the UNet's input maps fill. All arrays are borrowed from the package's bytes.
+// Letters: J joints, S shape coefficients, N covered texels, T texels a side, K = kSkinInfluences. "Covered" texels carry a Gaussian each;
+// "border" texels are the two-texel dilation around the charts, which only the UNet's input maps fill. All arrays are borrowed from the
+// package's bytes.
 #pragma once
 
 #include <array>
@@ -42,9 +43,7 @@ struct Body {
 
   uint32_t joint_count() const { return static_cast<uint32_t>(parents.size()); }
   uint32_t texel_count() const { return static_cast<uint32_t>(texel.size()); }
-  uint32_t shape_count() const {
-    return parents.empty() ? 0 : static_cast<uint32_t>(joint_shape_basis_m.size() / (3 * parents.size()));
-  }
+  uint32_t shape_count() const { return parents.empty() ? 0 : static_cast<uint32_t>(joint_shape_basis_m.size() / (3 * parents.size())); }
   SkeletonView mean_skeleton() const { return {parents, joint_position_m}; }
 };
 
@@ -58,8 +57,8 @@ struct MapStatistics {
   std::array<float, kMapChannels> scale{2, 2, 2, 1, 1, 1};  // position / 0.5 m, unit normals
 };
 
-// The UNet's pose input, always of the mean template (paper, section 4.1): per covered or border texel the posed position minus the root joint's world
-// position, and the posed normal, both standardised; every other texel is zero in all channels. Scratch holds J transforms.
+// The UNet's pose input, always of the mean template (paper, section 4.1): per covered or border texel the posed position minus the root
+// joint's world position, and the posed normal, both standardised; every other texel is zero in all channels. Scratch holds J transforms.
 // maps: [T,T,stride] floats, channels 0..5 of each texel are written (all T*T of them), the rest of the stride is left alone.
 void draw_pose_maps(const Body& body, const PoseView& pose, const MapStatistics& statistics, std::span<Affine> scratch, uint32_t stride,
                     std::span<float> maps);

@@ -14,8 +14,8 @@ namespace figurine {
 struct Motion {
   std::string name;
   float frames_per_second = 0;
-  std::vector<std::string> joint_names;      // [J] must equal the body's
-  uint32_t frame_count = 0;                  // F >= 1
+  std::vector<std::string> joint_names;       // [J] must equal the body's
+  uint32_t frame_count = 0;                   // F >= 1
   std::span<const float> root_translation_m;  // [F,3] of the root joint from its rest position
   std::span<const float> rotations;           // [F,J,4] unit quaternions, wxyz
 

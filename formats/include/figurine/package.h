@@ -1,8 +1,10 @@
-// Reads a .fgn package: 64-byte header, flatbuffer index, 64-byte-aligned blobs (docs/package.md; formats/schema/package.fbs is the manual of the index).
+// Reads a .fgn package: 64-byte header, flatbuffer index, 64-byte-aligned blobs (docs/package.md; formats/schema/package.fbs is the manual
+// of the index).
 //
-// Opening verifies in stages and always: size, magic, version, exact length, ranges, checksums (XXH3-64 of the index and of every blob), the
-// flatbuffers Verifier with tight limits, then meaning (shapes x type = bytes, finite values, positive scales, parents before children, declared
-// budgets). After that no access can fail, and views point into the caller's bytes: keep them mapped and unchanged while a view lives.
+// Opening verifies in stages and always: size, magic, version, exact length, ranges, checksums (XXH3-64 of the index and of every blob),
+// the flatbuffers Verifier with tight limits, then meaning (shapes x type = bytes, finite values, positive scales, parents before children,
+// declared budgets). After that no access can fail, and views point into the caller's bytes: keep them mapped and unchanged while a view
+// lives.
 #pragma once
 
 #include <array>
@@ -50,17 +52,17 @@ struct KeyValue {
 
 // Where a package came from and what may be done with it. Licence and consent after VRM 1.0's meta.
 struct Provenance {
-  std::string tool;                // "figurine-train 0.1.0"
-  std::string created;             // ISO 8601 date, or empty for reproducible bytes
-  std::vector<KeyValue> settings;  // command, seeds, training settings
+  std::string tool;                  // "figurine-train 0.1.0"
+  std::string created;               // ISO 8601 date, or empty for reproducible bytes
+  std::vector<KeyValue> settings;    // command, seeds, training settings
   std::vector<std::string> sources;  // data: name, version, licence
   std::vector<QualityMetric> quality;
   std::string licence_name;
   std::string licence_url;
   std::vector<std::string> authors;
-  std::string avatar_permission;   // who may perform: "onlyAuthor", "onlySeparatelyLicensedPerson", "everyone"
-  std::string commercial_usage;    // "personalNonProfit", "personalProfit", "corporation"
-  std::string depicted_person;     // "synthetic", or how consent was given
+  std::string avatar_permission;  // who may perform: "onlyAuthor", "onlySeparatelyLicensedPerson", "everyone"
+  std::string commercial_usage;   // "personalNonProfit", "personalProfit", "corporation"
+  std::string depicted_person;    // "synthetic", or how consent was given
 };
 
 // A tensor of the index, for the inspector and for --diff.

@@ -1,8 +1,9 @@
 // What a pose is, and the arithmetic from a pose to skinned texels that the trainer and the device share (docs/numerics.md, "Pose").
 //
-// Rest frames of all joints are world-aligned, so a joint's rest transform is a translation to its rest position. A pose gives every joint a
-// rotation relative to its parent, and the root a translation from its rest position:
-//   R_root = Q_root, p_root = r_root + translation;   R_j = R_parent Q_j, p_j = p_parent + R_parent (r_j - r_parent);   B_j x = R_j (x - r_j) + p_j.
+// Rest frames of all joints are world-aligned, so a joint's rest transform is a translation to its rest position. A pose gives every joint
+// a rotation relative to its parent, and the root a translation from its rest position:
+//   R_root = Q_root, p_root = r_root + translation;   R_j = R_parent Q_j, p_j = p_parent + R_parent (r_j - r_parent);   B_j x = R_j (x -
+//   r_j) + p_j.
 // Poses travel as quaternions (wxyz): no libm is needed on the way, and every operation here is exactly rounded, so all CPUs agree.
 // Based on: Loper et al., SMPL, 2015, eq. 2-4 (linear blend skinning); normals by the inverse transpose of the blended linear part.
 #pragma once
@@ -15,7 +16,7 @@
 
 namespace figurine {
 
-inline constexpr uint32_t kMaxJoints = 255;   // joint indices are stored in one byte
+inline constexpr uint32_t kMaxJoints = 255;     // joint indices are stored in one byte
 inline constexpr uint32_t kSkinInfluences = 8;  // K: joints per texel
 
 // [3,4] row-major: y = A x + t.

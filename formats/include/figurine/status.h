@@ -1,7 +1,7 @@
 // Errors as values, for everything that comes from outside: packages, data sets, motions, command lines, the machine itself.
 //
-// A Status says what went wrong (code), and in one line which file or field and why (message). Result<T> is a value or a Status. Nothing here throws;
-// the runtime is built without exceptions. Broken contracts of callers are FIG_CHECK's (check.h).
+// A Status says what went wrong (code), and in one line which file or field and why (message). Result<T> is a value or a Status. Nothing
+// here throws; the runtime is built without exceptions. Broken contracts of callers are FIG_CHECK's (check.h).
 #pragma once
 
 #include <cstdint>
@@ -80,7 +80,7 @@ class [[nodiscard]] Result {
 }  // namespace figurine
 
 // Returns the error of EXPRESSION (a Status) from the enclosing function.
-#define FIG_RETURN_IF_ERROR(expression)                       \
-  do {                                                        \
+#define FIG_RETURN_IF_ERROR(expression)                                                       \
+  do {                                                                                        \
     if (::figurine::Status fig_status_ = (expression); !fig_status_.ok()) return fig_status_; \
   } while (false)
