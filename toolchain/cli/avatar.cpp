@@ -20,6 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr uint32_t kDefaultOctaves = 5;
+
 // As typed; what was not given comes from the preset, or from the run that is resumed.
 struct AvatarArguments {
   std::string data, body, run;
@@ -27,7 +29,7 @@ struct AvatarArguments {
   std::optional<std::string> preset, init, template_mode, fourier, precision, background;
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay;
-  std::optional<uint32_t> warmup;
+  std::optional<uint32_t> warmup, views;
   bool freeze_pose = false;
   uint32_t threads = 0;  // 0: all cores
 };
@@ -44,12 +46,17 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   using train::TrainingBackground;
   if (arguments.template_mode) settings.template_mode = *arguments.template_mode == "mean" ? TemplateMode::kMean : TemplateMode::kShaped;
   if (arguments.freeze_pose) settings.freeze_pose = true;
-  if (arguments.fourier) settings.fourier_octaves = *arguments.fourier == "off" ? 0 : 5;
+  if (arguments.fourier) {
+    settings.fourier_octaves = *arguments.fourier == "off"  ? 0
+                               : *arguments.fourier == "on" ? kDefaultOctaves
+                                                            : uint32_t(std::stoul(*arguments.fourier));
+  }
   if (arguments.seed) settings.seed = *arguments.seed;
   if (arguments.init) settings.init = *arguments.init;
   if (arguments.learning_rate) settings.schedule.peak = *arguments.learning_rate;
   if (arguments.weight_decay) settings.weight_decay = *arguments.weight_decay;
   if (arguments.warmup) settings.warmup_iterations = *arguments.warmup;
+  if (arguments.views) settings.views_per_pose = *arguments.views;
   if (arguments.iterations) settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
   if (arguments.minutes) settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};
   if (arguments.precision) {
@@ -153,14 +160,18 @@ void add_avatar_command(CLI::App& app) {
   command->add_option("--template", arguments->template_mode, "Gaussians sit on the person's own shape (default) or on the mean template")
       ->check(CLI::IsMember({"shaped", "mean"}));
   command->add_flag("--freeze-pose", arguments->freeze_pose, "Experiment: the network sees the rest pose in the true root orientation");
-  command->add_option("--fourier", arguments->fourier, "Constant Fourier channels in the input (default: on for nano and edge)")
-      ->check(CLI::IsMember({"on", "off"}));
+  command
+      ->add_option("--fourier", arguments->fourier,
+                   "Octaves of constant Fourier channels in the input, 1 to 10, or on (5) or off (default: the preset's)")
+      ->check(CLI::IsMember({"on", "off"}) | CLI::Range(1, 10));
   command->add_option("--learning-rate", arguments->learning_rate, "Peak of the schedule (default 2e-3)")->check(CLI::PositiveNumber);
   command->add_option("--weight-decay", arguments->weight_decay, "AdamW's (default 0)")->check(CLI::NonNegativeNumber);
   command->add_option("--precision", arguments->precision, "Of the convolutions (default auto: bf16 where the CPU has it)")
       ->check(CLI::IsMember({"auto", "f32", "bf16"}));
   command->add_option("--background", arguments->background, "Behind prediction and truth in the loss")
       ->check(CLI::IsMember({"black", "grey", "random"}));
+  command->add_option("--views-per-pose", arguments->views, "Images of one pose an iteration (default 1, as in the paper)")
+      ->check(CLI::Range(1, 64));
   command->add_option("--warmup", arguments->warmup, "Iterations of fitting reference Gaussians first (default 0)");
   command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));
   command->callback([arguments] {

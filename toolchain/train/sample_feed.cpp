@@ -131,21 +131,32 @@ std::shared_ptr<const CroppedImage> SampleFeed::image(size_t pair) {
   return crop;
 }
 
-Sample SampleFeed::prepare(uint64_t iteration) {
+SampleView SampleFeed::prepare_view(uint64_t iteration, size_t pair) {
   const TrainSettings& settings = model_.settings();
-  const size_t pair = order_.item(iteration);
-  const auto [frame, camera] = pairs_[pair];
+  const size_t camera = pairs_[pair].second;
   const std::shared_ptr<const CroppedImage> truth = image(pair);
-  Sample sample{.iteration = iteration, .frame = frame, .camera = camera, .posed = {}, .view = {}, .target = {}};
-  sample.view.camera = data_.cameras()[camera].camera;
-  sample.view.crop = truth->rect;
+  SampleView view{.camera = camera, .view = {.camera = data_.cameras()[camera].camera, .crop = truth->rect}, .target = {}};
   // Gaussians could hide from the loss outside the crop: now and then it looks at the whole image.
   if (settings.whole_image_period > 0 && iteration % settings.whole_image_period == settings.whole_image_period - 1) {
-    sample.view.crop = {0, 0, sample.view.camera.width_px, sample.view.camera.height_px};
-    sample.loss_scale =
-        float(sample.view.crop.width) * float(sample.view.crop.height) / (float(truth->rect.width) * float(truth->rect.height));
+    view.view.crop = {0, 0, view.view.camera.width_px, view.view.camera.height_px};
+    view.loss_scale = float(view.view.crop.width) * float(view.view.crop.height) / (float(truth->rect.width) * float(truth->rect.height));
   }
-  sample.target = target_of(*truth, sample.view.crop);
+  view.target = target_of(*truth, view.view.crop);
+  return view;
+}
+
+Sample SampleFeed::prepare(uint64_t iteration) {
+  const TrainSettings& settings = model_.settings();
+  const size_t pair = order_.item(iteration), frame = pairs_[pair].first;
+  Sample sample{.iteration = iteration, .frame = frame, .posed = {}, .views = {}};
+  // Further views of the same pose are spread over its cameras, so that they show different sides of the person.
+  const auto of_other_frame = [&](const std::pair<size_t, size_t>& other) { return other.first != frame; };
+  const auto here = pairs_.begin() + static_cast<std::ptrdiff_t>(pair);
+  const size_t first =
+      static_cast<size_t>(std::find_if(std::make_reverse_iterator(here), pairs_.rend(), of_other_frame).base() - pairs_.begin());
+  const size_t count = static_cast<size_t>(std::find_if(here, pairs_.end(), of_other_frame) - pairs_.begin()) - first;
+  const size_t views = std::min<size_t>(settings.views_per_pose, count);
+  for (size_t v = 0; v < views; ++v) sample.views.push_back(prepare_view(iteration, first + (pair - first + v * count / views) % count));
   sample.posed = model_.pose(model_.from_capture(data_.frames()[frame]).view());
   switch (settings.background) {
     case TrainingBackground::kBlack:

@@ -1,7 +1,7 @@
-// What the training loop eats: for every iteration one image of one training pose, cropped, with its UNet input; prepared on a thread of
-// its own, a few iterations ahead.
+// What the training loop eats: for every iteration one training pose with its UNet input, and one or more images of it, cropped; prepared
+// on a thread of its own, a few iterations ahead.
 //
-// Which image an iteration gets depends on (seed, iteration) alone. Images are decoded at their first use and kept as 8-bit crops around
+// Which images an iteration gets depends on (seed, iteration) alone. Images are decoded at their first use and kept as 8-bit crops around
 // the mask (about 0.3 MB at 512x512), up to a limit; past it they are decoded again.
 #pragma once
 
@@ -22,14 +22,19 @@
 
 namespace figurine::train {
 
-struct Sample {
-  uint64_t iteration = 0;
-  size_t frame = 0, camera = 0;  // of the data set's lists
-  PosedBody posed;
+struct SampleView {
+  size_t camera = 0;  // of the data set's list
   model::RenderView view;
   torch::Tensor target;  // [4,h,w] premultiplied RGB and mask of view.crop
-  std::array<float, 3> background{0, 0, 0};
   float loss_scale = 1;  // crop area over mask box area: keeps a pixel's weight when the whole image is looked at
+};
+
+struct Sample {
+  uint64_t iteration = 0;
+  size_t frame = 0;  // of the data set's list
+  PosedBody posed;
+  std::vector<SampleView> views;  // of that frame, the shuffled order's own first
+  std::array<float, 3> background{0, 0, 0};
 };
 
 struct CroppedImage {
@@ -58,12 +63,13 @@ class SampleFeed {
 
  private:
   Sample prepare(uint64_t iteration);
+  SampleView prepare_view(uint64_t iteration, size_t pair);
   std::shared_ptr<const CroppedImage> image(size_t pair);
   void work();
 
   const dataset::Dataset& data_;
   const AvatarModel& model_;
-  std::vector<std::pair<size_t, size_t>> pairs_;  // (frame, camera) of all training images
+  std::vector<std::pair<size_t, size_t>> pairs_;  // (frame, camera) of all training images, by frame
   ShuffledOrder order_;
   std::unordered_map<size_t, std::shared_ptr<const CroppedImage>> images_;
   size_t image_bytes_ = 0;

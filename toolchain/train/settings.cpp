@@ -96,6 +96,7 @@ nlohmann::json to_json(const TrainSettings& s) {
           {"adamw", {{"beta1", s.beta1}, {"beta2", s.beta2}, {"epsilon", s.epsilon}, {"weight_decay", s.weight_decay}}},
           {"precision", s.bf16 ? "bf16" : "f32"},
           {"threads", s.threads},
+          {"views_per_pose", s.views_per_pose},
           {"loss", {{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}, {"lpips", 0.0}}},
           {"background", to_string(s.background)},
           {"warmup_iterations", s.warmup_iterations},
@@ -132,6 +133,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     require(precision == "bf16" || precision == "f32", where, "precision: is neither f32 nor bf16");
     s.bf16 = precision == "bf16";
     s.threads = json.at("threads").get<uint32_t>();
+    s.views_per_pose = json.at("views_per_pose").get<uint32_t>();
     s.ssim_weight = json.at("loss").at("ssim").get<float>();
     s.mask_weight = json.at("loss").at("mask").get<float>();
     s.background = parse(json.at("background").get<std::string>(), kBackgrounds, where + ": background");
@@ -149,6 +151,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
   }
   require(s.schedule.peak > 0 && std::isfinite(s.schedule.peak), where, "learning_rate: must be positive and finite");
   require((s.schedule.budget.iterations > 0) != (s.schedule.budget.seconds > 0), where, "budget: iterations or seconds, one of both");
+  require(s.views_per_pose >= 1 && s.views_per_pose <= 64, where, "views_per_pose: must be 1 to 64");
   require(s.threads >= 1 && s.threads <= 256, where, "threads: must be 1 to 256");
   return s;
 }

@@ -42,6 +42,7 @@ struct TrainSettings {
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-10, weight_decay = 0;
   bool bf16 = false;  // arithmetic of the convolutions while training; weights, head and evaluation are float
   uint32_t threads = 1;
+  uint32_t views_per_pose = 1;  // images of one pose an iteration, sharing one run of the network; the paper's batch is 1
   float ssim_weight = 0.1f;
   float mask_weight = 0.1f;
   TrainingBackground background = TrainingBackground::kBlack;

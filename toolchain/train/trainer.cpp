@@ -1,7 +1,6 @@
 #include "toolchain/train/trainer.h"
 
 #include <ATen/Parallel.h>
-#include <malloc.h>
 
 #include <chrono>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/error.h"
 #include "toolchain/model/adamw.h"
+#include "toolchain/model/allocator.h"
 #include "toolchain/model/loss.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/interrupt.h"
@@ -142,28 +142,36 @@ class Trainer {
     return result;
   }
 
-  // The graph is cut at the head and at the picture, so that each part's backward pass can be timed. Gradients are the same.
+  // The graph is cut at the head and at the pictures, so that each part's backward pass can be timed and the views of a pose can share one
+  // run of the network. Gradients are those of the mean loss of the views.
   IterationResult image_iteration(const Sample& sample, const torch::Tensor& head, StageClock& clock) {
     const torch::Tensor head_leaf = head.detach().requires_grad_();
-    const torch::Tensor image = model_.renderer().render(head_leaf, model_.head_frame(sample.posed), sample.view);
-    clock.add(state_.stages.splat_forward);
-    const torch::Tensor image_leaf = image.detach().requires_grad_();
-    model::LossTerms terms;
-    const torch::Tensor loss = model::image_loss(
-        image_leaf, sample.target, sample.background,
-        {.ssim_weight = settings_.ssim_weight, .mask_weight = settings_.mask_weight, .threads = settings_.threads}, &terms);
-    (loss * sample.loss_scale).backward();
-    clock.add(state_.stages.loss);
-    image.backward(image_leaf.grad());
-    clock.add(state_.stages.splat_backward);
+    const double share = 1.0 / static_cast<double>(sample.views.size());
+    IterationResult result;
+    for (const SampleView& view : sample.views) {
+      const torch::Tensor image = model_.renderer().render(head_leaf, model_.head_frame(sample.posed), view.view);
+      clock.add(state_.stages.splat_forward);
+      const torch::Tensor image_leaf = image.detach().requires_grad_();
+      model::LossTerms terms;
+      const torch::Tensor loss = model::image_loss(
+          image_leaf, view.target, sample.background,
+          {.ssim_weight = settings_.ssim_weight, .mask_weight = settings_.mask_weight, .threads = settings_.threads}, &terms);
+      (loss * (view.loss_scale * share)).backward();
+      clock.add(state_.stages.loss);
+      image.backward(image_leaf.grad());
+      clock.add(state_.stages.splat_backward);
+      result.loss += terms.total * view.loss_scale * share;
+      result.squared_error += terms.squared_error;
+      result.foreground += terms.foreground;
+    }
     head.backward(head_leaf.grad());
     clock.add(state_.stages.unet_backward);
-    return {terms.total * sample.loss_scale, terms.squared_error, terms.foreground};
+    return result;
   }
 
   [[noreturn]] void fail(const Sample& sample, const char* what) const {
-    throw InputError(run_.path + ": iteration " + std::to_string(sample.iteration) + " (" + data_.image_path(sample.frame, sample.camera) +
-                     "): " + what + "; the last checkpoint is kept");
+    throw InputError(run_.path + ": iteration " + std::to_string(sample.iteration) + " (" +
+                     data_.image_path(sample.frame, sample.views.front().camera) + "): " + what + "; the last checkpoint is kept");
   }
 
   void record(const IterationResult& result, double rate) {
@@ -306,9 +314,7 @@ TrainResult train_avatar(const TrainRequest& request) {
     if (error) throw InputError(request.run + ": cannot be created: " + error.message());
   }
   at::set_num_threads(static_cast<int>(settings.threads));
-  // Activations come and go every iteration: glibc's default gives them back to the system each time, and their pages fault in anew.
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+  model::keep_freed_memory();
   return Trainer(request, settings, body, data, std::move(description)).run();
 }
 
