@@ -116,7 +116,7 @@ inline GradientErrors check_head_gradients(uint32_t sh_degree) {
   const model::HeadFrame frame{
       .body = &capsule.body, .texel_position_m = capsule.position, .world_from_rest = transforms, .decoding = {.sh_degree = sh_degree}};
   const uint32_t channels = head_channels(sh_degree), texels = capsule.body.texel_count();
-  std::mt19937 random(170 + sh_degree);
+  std::mt19937 random(270 + sh_degree);
   std::normal_distribution<double> normal;
   std::vector<double> head(size_t(16) * 16 * channels);
   for (double& value : head) value = 0.4 * normal(random);
