@@ -133,7 +133,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     require(precision == "bf16" || precision == "f32", where, "precision: is neither f32 nor bf16");
     s.bf16 = precision == "bf16";
     s.threads = json.at("threads").get<uint32_t>();
-    s.views_per_pose = json.at("views_per_pose").get<uint32_t>();
+    s.views_per_pose = json.value("views_per_pose", 1u);
     s.ssim_weight = json.at("loss").at("ssim").get<float>();
     s.mask_weight = json.at("loss").at("mask").get<float>();
     s.background = parse(json.at("background").get<std::string>(), kBackgrounds, where + ": background");
