@@ -12,24 +12,12 @@ int main(int argc, char** argv) {
   CLI::App app{"figurine-train: bodies, captures, avatars and packages, offline"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "figurine-train " FIGURINE_VERSION);
-#ifdef FIGURINE_COMMAND_BODY
   figurine::cli::add_body_command(app);
-#endif
-#ifdef FIGURINE_COMMAND_MOTION
   figurine::cli::add_motion_command(app);
-#endif
-#ifdef FIGURINE_COMMAND_CAPTURE
   figurine::cli::add_capture_command(app);
-#endif
-#ifdef FIGURINE_COMMAND_AVATAR
   figurine::cli::add_avatar_command(app);
-#endif
-#ifdef FIGURINE_COMMAND_PACK
   figurine::cli::add_pack_command(app);
-#endif
-#ifdef FIGURINE_COMMAND_EVALUATE
   figurine::cli::add_evaluate_command(app);
-#endif
   try {
     app.parse(argc, argv);
     return 0;

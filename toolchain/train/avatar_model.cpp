@@ -56,6 +56,7 @@ PosedBody AvatarModel::pose(const PoseView& pose) const {
     for (uint32_t j = 0; j < joints; ++j) frozen[4 * j] = 1;
     std::copy_n(pose.rotations.begin(), 4, frozen.begin());
     seen.rotations = frozen;
+    seen.root_translation_m = {0, 0, 0};  // the maps leave it out; so do their last bits now
   }
   draw_pose_maps(body_, seen, MapStatistics{}, posed.world_from_rest, channels, {input, constant_input_.size()});
   skinning_transforms({body_.parents, joint_position_m_}, pose, posed.world_from_rest);
