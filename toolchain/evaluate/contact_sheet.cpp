@@ -61,10 +61,16 @@ std::vector<std::pair<size_t, size_t>> choose_pictures(const dataset::Dataset& d
   }
   const auto& from = both.empty() ? any : both;
   if (from.empty()) throw InputError(data.directory() + ": nothing is held out, so there is nothing to show");
-  // Evenly over the list, one camera further each time: neighbours in it share a frame.
+  // Evenly over the frames, one camera further each time.
+  std::vector<size_t> starts;  // of each frame's stretch of the list
+  for (size_t i = 0; i < from.size(); ++i) {
+    if (i == 0 || from[i].first != from[i - 1].first) starts.push_back(i);
+  }
   std::vector<std::pair<size_t, size_t>> chosen;
-  for (size_t i = 0; i < count; ++i)
-    chosen.push_back(from[std::min(from.size() - 1, i * from.size() / count + i % std::max<size_t>(1, from.size() / count))]);
+  for (size_t i = 0; i < count; ++i) {
+    const size_t at = i * starts.size() / count, end = at + 1 < starts.size() ? starts[at + 1] : from.size();
+    chosen.push_back(from[starts[at] + i % (end - starts[at])]);
+  }
   return chosen;
 }
 
