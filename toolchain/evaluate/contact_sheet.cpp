@@ -50,7 +50,18 @@ void paste(const Picture& picture, const Box& box, ports::ImageU8& sheet, uint32
   }
 }
 
-std::vector<std::pair<size_t, size_t>> choose_pictures(const dataset::Dataset& data, size_t count) {
+// How straight the person looks into the camera: the cosine between the head's forward axis and the way to the camera.
+float facing(const train::TrainedAvatar& avatar, size_t frame, const Camera& camera) {
+  const train::OwnedPose pose = avatar.model().from_capture(avatar.data().frames()[frame]);
+  const Affine head = avatar.model().pose(pose.view()).world_from_rest[head_joints().front()];
+  const auto& m = camera.view_from_world;
+  float dot = 0;
+  for (int k = 0; k < 3; ++k) dot -= head.m[4 * k + 2] * m[8 + k];  // rest forward is +z; the camera looks along its own third row
+  return dot;
+}
+
+std::vector<std::pair<size_t, size_t>> choose_pictures(const train::TrainedAvatar& avatar, size_t count) {
+  const dataset::Dataset& data = avatar.data();
   std::vector<std::pair<size_t, size_t>> both, any;
   for (size_t frame = 0; frame < data.frames().size(); ++frame) {
     for (size_t camera = 0; camera < data.cameras().size(); ++camera) {
@@ -61,7 +72,7 @@ std::vector<std::pair<size_t, size_t>> choose_pictures(const dataset::Dataset& d
   }
   const auto& from = both.empty() ? any : both;
   if (from.empty()) throw InputError(data.directory() + ": nothing is held out, so there is nothing to show");
-  // Evenly over the frames, one camera further each time.
+  // Evenly over the frames; every other picture from the camera that sees most of the face, the others one camera further each time.
   std::vector<size_t> starts;  // of each frame's stretch of the list
   for (size_t i = 0; i < from.size(); ++i) {
     if (i == 0 || from[i].first != from[i - 1].first) starts.push_back(i);
@@ -69,7 +80,14 @@ std::vector<std::pair<size_t, size_t>> choose_pictures(const dataset::Dataset& d
   std::vector<std::pair<size_t, size_t>> chosen;
   for (size_t i = 0; i < count; ++i) {
     const size_t at = i * starts.size() / count, end = at + 1 < starts.size() ? starts[at + 1] : from.size();
-    chosen.push_back(from[starts[at] + i % (end - starts[at])]);
+    size_t pick = starts[at] + i % (end - starts[at]);
+    for (size_t k = starts[at]; i % 2 == 0 && k < end; ++k) {
+      const auto sees = [&](size_t candidate) {
+        return facing(avatar, from[candidate].first, data.cameras()[from[candidate].second].camera);
+      };
+      if (sees(k) > sees(pick)) pick = k;
+    }
+    chosen.push_back(from[pick]);
   }
   return chosen;
 }
@@ -84,7 +102,7 @@ ports::ImageU8 make_contact_sheet(train::TrainedAvatar& avatar, const ContactShe
   };
   std::vector<Pair> pairs;
   float aspect = 0.3f;  // width over height of the widest person
-  for (const auto& [frame, camera] : choose_pictures(data, options.pairs)) {
+  for (const auto& [frame, camera] : choose_pictures(avatar, options.pairs)) {
     const Camera& view = data.cameras()[camera].camera;
     const PosedFrame posed = pose_frame(avatar, frame);
     Pair pair{.truth = true_picture(data, frame, camera),
