@@ -25,6 +25,7 @@ def row(name, run):
     result = {"name": name}
     for key in ("command", "commit"):
         result[key] = read(run / "run.json").get(key)
+    result["person_seed"] = read(run / "run.json")["data"]["seed"]
     for key in ("settings", "iterations", "train_seconds", "iterations_per_second", "breakdown_ms", "difference_psnr_db"):
         result[key] = report.get(key)
     for group in GROUPS:
@@ -44,13 +45,13 @@ def main(folder, output, command):
     rows = {run.name: row(run.name, run) for run in sorted((folder / "runs").iterdir()) if (run / "evaluation.json").exists()}
     if not rows:
         sys.exit(f"line_report: {folder}: no evaluated run")
-    main_row = "shaped"
+    main_row = "shipped"
     reports = [read(folder / "runs" / name / "evaluation.json") for name in rows]
     machine = next((report["machine"] for report in reports if report), None)
     parity = read(folder / "parity.json") or {}
     oracle = read(pathlib.Path("docs/results/splat_oracle.json")) or {}
     # Against the same trainer and the same number of iterations.
-    posed, frozen = figure(rows, "short", "held_out_poses", "psnr_db"), figure(rows, "short_frozen_pose", "held_out_poses", "psnr_db")
+    posed, frozen = figure(rows, main_row, "held_out_poses", "psnr_db"), figure(rows, "shipped_frozen_pose", "held_out_poses", "psnr_db")
     result = {
         "psnr_view_db": figure(rows, main_row, "held_out_views", "psnr_db"),
         "psnr_pose_db": figure(rows, main_row, "held_out_poses", "psnr_db"),
