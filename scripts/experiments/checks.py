@@ -51,7 +51,7 @@ def main():
 
     text_of("build/dev/tests/stability/figurine-stability", "-o", str(RESULTS / "stability.json"))
 
-    bench = ["build/release/samples/figurine/figurine", "bench", "samples/packages/person.fgn", "--motion", "samples/packages/walk.fgn", "--json", "-"]
+    bench = ["build/release/samples/figurine/figurine", "bench", "samples/packages/person.fgn", "--motion", "samples/packages/walk.fgn", "--size", "512x512", "--json", "-"]
     write("bench", json.loads(text_of(*bench)), " ".join(bench))
 
 
