@@ -4,10 +4,10 @@
 #   scripts/experiments/line.sh [FOLDER]        FOLDER (default out/line) keeps every step: run it again and it goes on where it stopped
 #
 # The person walks (four walks and an endless one from CMU 01_03) and jumps (01_01), turned through 360 degrees. All rows train for
-# iterations, which a busy machine cannot change; the shipped avatar's 11,000 with two views each are under ten minutes of two quiet cores.
+# iterations, which a busy machine cannot change; the shipped avatar's 11,000 with two views each took 8.3 minutes on one thread.
 #
 # Environment: ITERATIONS (3000) of all rows but the shipped avatar's and its frozen twin's, SEED (56) of the person, IDENTITY (the folder that capture makes of
-# it), ROWS (all) a list of row names to limit training to. On two quiet cores it takes about 30 minutes.
+# it), ROWS (all) a list of row names to limit training to. On two quiet cores it takes about 30 minutes by estimate.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
