@@ -60,7 +60,8 @@ struct Map {  // a value being read: [size,size,channels]
   int64_t size, channels;
 };
 
-// Sum over the taps inside the image; outside is zero in reals, so a tap there adds nothing. weights: [kernel,kernel,channels] of one output.
+// Sum over the taps inside the image; outside is zero in reals, so a tap there adds nothing. weights: [kernel,kernel,channels] of one
+// output.
 template <class Element>
 int32_t convolution_sum(const Element* data, int64_t size, int64_t channels, int32_t zero_point, const int8_t* weights, int64_t kernel,
                         int64_t y, int64_t x) {
@@ -121,8 +122,7 @@ void upsample(const Map& in, std::vector<int8_t>& out) {
     for (int64_t x = 0; x < size; ++x) {
       for (int64_t c = 0; c < in.channels; ++c) {
         const auto at = [&](int64_t row, int64_t column) { return int32_t{in.data[(row * in.size + column) * in.channels + c]}; };
-        const int32_t sum =
-            9 * at(y / 2, x / 2) + 3 * at(y / 2, far(x)) + 3 * at(far(y), x / 2) + at(far(y), far(x));
+        const int32_t sum = 9 * at(y / 2, x / 2) + 3 * at(y / 2, far(x)) + 3 * at(far(y), x / 2) + at(far(y), far(x));
         out[size_t((y * size + x) * in.channels + c)] = static_cast<int8_t>((sum + 8) >> 4);
       }
     }

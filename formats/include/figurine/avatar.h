@@ -9,6 +9,7 @@
 
 #include "figurine/body.h"
 #include "figurine/camera.h"
+#include "figurine/fixed_point.h"
 #include "figurine/network.h"
 
 namespace figurine {
@@ -35,12 +36,17 @@ struct PoseStatistics {
   std::span<const float> covariance;  // [3P,3P] symmetric, regularised to be positive definite
 };
 
+// In which arithmetic a network is evaluated.
+enum class Precision : uint8_t { kFloat32, kFixedPoint };
+
 struct GoldenFrame {
   std::array<float, 3> root_translation_m{0, 0, 0};
   std::span<const float> rotations;  // [J,4]
   Camera camera;
   std::array<float, 3> background{0.5f, 0.5f, 0.5f};
   std::span<const uint8_t> png;  // 8-bit RGB of the trainer's renderer over the background; may be empty
+  // XXH3-128 (low, high) of the frame in fixed point: RGBA8 rows over the background, equal on every CPU. Zero: none.
+  std::array<uint64_t, 2> fixed_point_hash{0, 0};
 };
 
 struct Avatar {
@@ -53,7 +59,8 @@ struct Avatar {
   MapStatistics map_statistics;
   uint32_t fourier_octaves = 0;
   HeadDecoding decoding;
-  Network network;
+  Network network;                // its float weights may be absent if fixed_point is there
+  FixedPointNetwork fixed_point;  // empty if the package has none
   PoseStatistics pose_statistics;
   GoldenFrame golden;
 };
