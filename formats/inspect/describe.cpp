@@ -109,7 +109,7 @@ std::string layer_name(const Layer& layer) {
 }
 
 Json describe_network(const Network& network) {
-  const std::vector<ValueShape> shapes = infer_shapes(network, true).value();
+  const std::vector<ValueShape> shapes = infer_shapes(network, false).value();
   Json layers = Json::array();
   for (size_t i = 0; i < network.layers.size(); ++i) {
     const Layer& layer = network.layers[i];
@@ -125,16 +125,49 @@ Json describe_network(const Network& network) {
 
 Json describe_golden(const GoldenFrame& golden) {
   if (golden.rotations.empty()) return nullptr;
-  return {{"joints", golden.rotations.size() / 4},
-          {"root_translation_m", numbers(golden.root_translation_m)},
-          {"width_px", golden.camera.width_px},
-          {"height_px", golden.camera.height_px},
-          {"focal_px", {number(golden.camera.fx_px), number(golden.camera.fy_px)}},
-          {"principal_point_px", {number(golden.camera.cx_px), number(golden.camera.cy_px)}},
-          {"near_m", number(golden.camera.near_m)},
-          {"view_from_world", numbers(golden.camera.view_from_world)},
-          {"background", numbers(golden.background)},
-          {"png_bytes", golden.png.size()}};
+  return {
+      {"joints", golden.rotations.size() / 4},
+      {"root_translation_m", numbers(golden.root_translation_m)},
+      {"width_px", golden.camera.width_px},
+      {"height_px", golden.camera.height_px},
+      {"focal_px", {number(golden.camera.fx_px), number(golden.camera.fy_px)}},
+      {"principal_point_px", {number(golden.camera.cx_px), number(golden.camera.cy_px)}},
+      {"near_m", number(golden.camera.near_m)},
+      {"view_from_world", numbers(golden.camera.view_from_world)},
+      {"background", numbers(golden.background)},
+      {"png_bytes", golden.png.size()},
+      {"fixed_point_hash", golden.fixed_point_hash == std::array<uint64_t, 2>{0, 0} ? Json() : Json(format_hash(golden.fixed_point_hash))},
+      {"fixed_point_library", golden.fixed_point_library}};
+}
+
+Json describe_precisions(const Avatar& avatar) {
+  Json list = Json::array();
+  for (const Precision precision : {Precision::kFloat32, Precision::kFixedPoint}) {
+    if (avatar.holds(precision)) list.push_back(to_string(precision));
+  }
+  return list;
+}
+
+Json describe_fixed_point(const Avatar& avatar) {
+  const FixedPointNetwork& fixed = avatar.fixed_point;
+  if (fixed.empty()) return nullptr;
+  uint64_t bytes = 0;
+  Json layers = Json::array();
+  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
+    const FixedPointConvolution& convolution = fixed.convolutions[i];
+    const uint64_t layer_bytes = convolution.weights.size_bytes() + convolution.weight_scale.size_bytes() + convolution.bias.size_bytes();
+    bytes += layer_bytes;
+    Json layer = {{"op", layer_name(avatar.network.layers[i])}, {"bytes", layer_bytes}};
+    if (const auto& scales = convolution.weight_scale; !scales.empty()) {
+      const auto [low, high] = std::ranges::minmax(scales);
+      layer["weight_scale"] = {{"min", number(low)}, {"max", number(high)}};
+    }
+    const bool is_head = i + 1 == avatar.network.layers.size();  // its result is float
+    layer["scale"] = is_head ? Json() : Json(number(fixed.values[i + 1].scale));
+    layer["zero_point"] = is_head ? Json() : Json(fixed.values[i + 1].zero_point);
+    layers.push_back(layer);
+  }
+  return {{"bytes", bytes}, {"input_scale", number(fixed.values[0].scale)}, {"layers", layers}};
 }
 
 Json describe_avatar(const Avatar& avatar) {
@@ -153,6 +186,8 @@ Json describe_avatar(const Avatar& avatar) {
             {"opacity_bias", number(decoding.opacity_bias)},
             {"sh_degree", decoding.sh_degree}}},
           {"network", describe_network(avatar.network)},
+          {"precisions", describe_precisions(avatar)},
+          {"fixed_point", describe_fixed_point(avatar)},
           {"pose_statistics_joints", avatar.pose_statistics.joints},
           {"golden", describe_golden(avatar.golden)}};
 }

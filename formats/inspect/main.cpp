@@ -61,7 +61,10 @@ Status inspect(const Options& options) {
     print(document);
   } else {
     print(figurine::inspect::print_package(document));
-    if (options.tensors) print("\n" + figurine::inspect::print_tensors(document["tensors"]));
+    if (options.tensors) {
+      print("\n" + figurine::inspect::print_tensors(document["tensors"]));
+      if (document.contains("avatar")) print(figurine::inspect::print_quantisation(document["avatar"]["fixed_point"]));
+    }
   }
   return {};
 }
@@ -74,7 +77,8 @@ int main(int argc, char** argv) {
   Options options;
   app.add_option("package", options.path, "the package")->required()->type_name("PKG");
   app.add_flag("--json", options.json, "print JSON (documented in docs/package.md)");
-  CLI::Option* tensors = app.add_flag("--tensors", options.tensors, "list every array: type, shape, bytes, range, checksum");
+  CLI::Option* tensors = app.add_flag("--tensors", options.tensors,
+                                      "list every array: type, shape, bytes, range, checksum; and the quantisation of every layer");
   app.add_option("--diff", options.other_path, "compare with this package: fields, and the largest difference of each array")
       ->type_name("OTHER")
       ->excludes(tensors);

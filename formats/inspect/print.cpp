@@ -102,6 +102,11 @@ void print_avatar(Page& page, const Json& avatar) {
   page.line("network", std::format("input {0}x{0}x{1}, {2} layers, {3} parameters, {4} MACs", text_of(network["input"]["size"]),
                                    text_of(network["input"]["channels"]), network["layers"].size(), text_of(network["parameters"]),
                                    in_millions(network["macs"])));
+  page.line("precision", joined(avatar["precisions"], ", "));
+  if (const Json& fixed = avatar["fixed_point"]; !fixed.is_null()) {
+    page.line("fixed point", std::format("{} of weights, scales and biases; one step of the input is {:.4g}", in_bytes(fixed["bytes"]),
+                                         fixed["input_scale"].get<double>()));
+  }
   page.line("Fourier octaves", text_of(avatar["fourier_octaves"]));
   const Json& decoding = avatar["decoding"];
   page.line("decoding", std::format("offset x {} m, scale x {} texel spacings, log-scale at most {}, opacity bias {}, SH degree {}",
@@ -110,10 +115,16 @@ void print_avatar(Page& page, const Json& avatar) {
   page.line("pose statistics",
             avatar["pose_statistics_joints"].empty() ? "none" : std::to_string(avatar["pose_statistics_joints"].size()) + " joints");
   const Json& golden = avatar["golden"];
-  page.line("golden frame", golden.is_null()
-                                ? "none"
-                                : std::format("{}x{} pixels, {} joints, image of {} bytes", text_of(golden["width_px"]),
-                                              text_of(golden["height_px"]), text_of(golden["joints"]), text_of(golden["png_bytes"])));
+  if (golden.is_null()) {
+    page.line("golden frame", "none");
+    return;
+  }
+  std::string frame = std::format("{}x{} pixels, {} joints, image of {} bytes", text_of(golden["width_px"]), text_of(golden["height_px"]),
+                                  text_of(golden["joints"]), text_of(golden["png_bytes"]));
+  if (const Json& hash = golden["fixed_point_hash"]; !hash.is_null()) {
+    frame += std::format("\nin fixed point {} by {}", text_of(hash), text_of(golden["fixed_point_library"]));
+  }
+  page.line("golden frame", frame);
 }
 
 void print_provenance(Page& page, const Json& provenance) {
@@ -179,6 +190,25 @@ std::string print_tensors(const Json& tensors) {
   for (const Json& tensor : tensors) {
     text += row(text_of(tensor["name"]), text_of(tensor["type"]), "[" + joined(tensor["shape"], ",") + "]", text_of(tensor["size_bytes"]),
                 six(tensor["min"]), six(tensor["max"]), six(tensor["mean"]), text_of(tensor["checksum"]));
+  }
+  return text;
+}
+
+std::string print_quantisation(const Json& fixed_point) {
+  if (fixed_point.is_null()) return "";
+  const auto row = [](const auto& layer, const auto& op, const auto& scale, const auto& zero, const auto& low, const auto& high,
+                      const auto& bytes) {
+    return std::format("{:<6}{:<16}{:>13}{:>6}{:>18}{:>13}{:>11}\n", layer, op, scale, zero, low, high, bytes);
+  };
+  const auto six = [](const Json& value) { return value.is_null() ? std::string() : std::format("{:.6g}", value.get<double>()); };
+  std::string text = "\n" + row("layer", "operator", "scale", "zero", "weight scale min", "max", "bytes");
+  text += row("input", "int16", six(fixed_point["input_scale"]), 0, "", "", "");
+  size_t i = 0;
+  for (const Json& layer : fixed_point["layers"]) {
+    const Json weights = layer.value("weight_scale", Json{{"min", nullptr}, {"max", nullptr}});
+    const bool is_head = layer["scale"].is_null();
+    text += row(i++, text_of(layer["op"]), is_head ? "float" : six(layer["scale"]), is_head ? "" : text_of(layer["zero_point"]),
+                six(weights["min"]), six(weights["max"]), text_of(layer["bytes"]));
   }
   return text;
 }

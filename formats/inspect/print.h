@@ -9,6 +9,8 @@ namespace figurine::inspect {
 
 std::string print_package(const Json& document);
 std::string print_tensors(const Json& tensors);
+// The quantisation of every layer's output; empty for null.
+std::string print_quantisation(const Json& fixed_point);
 std::string print_comparison(const Json& comparison);
 
 }  // namespace figurine::inspect

@@ -32,6 +32,10 @@ class TensorValues {
         return value_at<int16_t>(data_, index);
       case DataType::kU32:
         return value_at<uint32_t>(data_, index);
+      case DataType::kI8:
+        return value_at<int8_t>(data_, index);
+      case DataType::kI32:
+        return value_at<int32_t>(data_, index);
     }
     return 0;
   }

@@ -1,5 +1,6 @@
 #include "figurine/network.h"
 
+#include <algorithm>
 #include <string>
 
 namespace figurine {
@@ -76,6 +77,10 @@ uint64_t count_parameters(const Network& network) {
     if (layer.op == LayerOp::kConv2d) parameters += weight_count(layer, (*shapes)[layer.inputs[0]]) + layer.out_channels;
   }
   return parameters;
+}
+
+bool has_weights(const Network& network) {
+  return std::any_of(network.layers.begin(), network.layers.end(), [](const Layer& layer) { return !layer.weights.empty(); });
 }
 
 Network make_pose_unet(uint32_t uv_size, uint32_t input_channels, uint32_t channels, uint32_t output_channels) {

@@ -28,18 +28,26 @@ const char* to_string(DataType type) {
       return "i16";
     case DataType::kU32:
       return "u32";
+    case DataType::kI8:
+      return "i8";
+    case DataType::kI32:
+      return "i32";
   }
   return "unknown";
 }
 
+const char* to_string(Precision precision) { return precision == Precision::kFixedPoint ? "q8" : "f32"; }
+
 size_t size_bytes(DataType type) {
   switch (type) {
     case DataType::kU8:
+    case DataType::kI8:
       return 1;
     case DataType::kI16:
       return 2;
     case DataType::kF32:
     case DataType::kU32:
+    case DataType::kI32:
       return 4;
   }
   return 0;
@@ -58,6 +66,19 @@ Package::Package(std::unique_ptr<Contents> contents) : contents_(std::move(conte
 Package::Package(Package&&) noexcept = default;
 Package& Package::operator=(Package&&) noexcept = default;
 Package::~Package() = default;
+
+namespace {
+
+// The header promises what the content holds, so that a reader of the header alone can tell. avatar: null for other kinds.
+Status check_features(const layout::Header& header, const Avatar* avatar) {
+  const bool promised = (header.required_features & kFeatureFixedPoint) != 0;
+  const bool held = avatar != nullptr && avatar->holds(Precision::kFixedPoint);
+  if (promised == held) return {};
+  return corrupt("header.required_features", "the bit of fixed point is ", promised ? "" : "not ", "set, such a network is ",
+                 held ? "" : "not ", "there");
+}
+
+}  // namespace
 
 Result<Package> Package::open(std::span<const std::byte> bytes, const std::string& name) {
   const Result<Container> container = open_container(bytes);
@@ -85,6 +106,7 @@ Result<Package> Package::open(std::span<const std::byte> bytes, const std::strin
         FIG_RETURN_IF_ERROR(read_motion(index, blobs, contents->content.emplace<Motion>()));
         break;
     }
+    FIG_RETURN_IF_ERROR(check_features(contents->header, std::get_if<Avatar>(&contents->content)));
     return blobs.check_all_known();
   };
   if (const Status status = read(); !status.ok()) return status.within(name);

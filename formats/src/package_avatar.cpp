@@ -40,7 +40,7 @@ Status read_decoding(const schema::HeadDecoding& table, HeadDecoding& out) {
 }
 
 // Shapes first, from the layer list alone: they say how large each weight blob has to be.
-Status read_network(const schema::Network& table, BlobReader& blobs, Network& out) {
+Status read_layers(const schema::Network& table, Network& out) {
   out.input_size = table.input_size();
   out.input_channels = table.input_channels();
   if (table.layers()->size() > kMaxLayers) return over_limit("network", "more than ", kMaxLayers, " layers");
@@ -51,23 +51,70 @@ Status read_network(const schema::Network& table, BlobReader& blobs, Network& ou
                           .kernel = entry->kernel(),
                           .relu = entry->relu()});
   }
-  const Result<std::vector<ValueShape>> shapes = infer_shapes(out, false);
-  if (!shapes.ok()) return shapes.status();
+  return infer_shapes(out, false).status();
+}
+
+// A convolution without float weights is allowed only where none has any.
+Status check_all_or_none(const Network& network) {
+  const auto holds = [](const Layer& layer) { return !layer.weights.empty() || !layer.bias.empty(); };
+  if (std::none_of(network.layers.begin(), network.layers.end(), holds)) return {};
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    const Layer& layer = network.layers[i];
+    if (layer.op != LayerOp::kConv2d || (!layer.weights.empty() && !layer.bias.empty())) continue;
+    return corrupt(concatenate({"network.", i, layer.weights.empty() ? ".weights" : ".bias"}), "is missing, while others are there");
+  }
+  return {};
+}
+
+// All of them, or none if the network is there in fixed point.
+Status read_float_weights(BlobReader& blobs, bool has_fixed_point, Network& out) {
+  const std::vector<ValueShape> shapes = *infer_shapes(out, false);
+  const auto presence = has_fixed_point ? BlobReader::kMayBeAbsent : BlobReader::kRequired;
   for (size_t i = 0; i < out.layers.size(); ++i) {
     Layer& layer = out.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
     const std::string name = concatenate({"network.", i});
-    const uint32_t in_channels = (*shapes)[layer.inputs[0]].channels;
-    FIG_RETURN_IF_ERROR(blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, layer.weights));
-    FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, layer.bias));
+    const uint32_t in_channels = shapes[layer.inputs[0]].channels;
+    FIG_RETURN_IF_ERROR(
+        blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, layer.weights, presence));
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, layer.bias, presence));
     FIG_RETURN_IF_ERROR(check_magnitude(layer.weights, name + ".weights", std::numeric_limits<float>::max()));
     FIG_RETURN_IF_ERROR(check_magnitude(layer.bias, name + ".bias", std::numeric_limits<float>::max()));
   }
-  return infer_shapes(out, true).status();
+  if (has_fixed_point) FIG_RETURN_IF_ERROR(check_all_or_none(out));
+  return {};
+}
+
+Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, const Network& network, FixedPointNetwork& out) {
+  const std::vector<ValueShape> shapes = *infer_shapes(network, false);
+  for (const schema::Quantisation* entry : *table.values()) {
+    if (out.values.size() == kMaxLayers) return over_limit("avatar.fixed_point", "more than ", kMaxLayers, " values");
+    out.values.push_back({.scale = entry->scale(), .zero_point = entry->zero_point()});
+  }
+  out.convolutions.resize(network.layers.size());
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    const Layer& layer = network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    FixedPointConvolution& convolution = out.convolutions[i];
+    const std::string name = concatenate({"fixed.", i});
+    const uint32_t in_channels = shapes[layer.inputs[0]].channels;
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, convolution.weights));
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".scale", {layer.out_channels}, convolution.weight_scale));
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, convolution.bias));
+  }
+  return validate_fixed_point(network, out);
+}
+
+// Layers, and their weights in float, in fixed point, or both.
+Status read_network(const schema::Avatar& table, BlobReader& blobs, Avatar& out) {
+  const bool has_fixed_point = table.fixed_point() != nullptr;
+  FIG_RETURN_IF_ERROR(read_layers(*table.network(), out.network));
+  FIG_RETURN_IF_ERROR(read_float_weights(blobs, has_fixed_point, out.network));
+  return has_fixed_point ? read_fixed_point(*table.fixed_point(), blobs, out.network, out.fixed_point) : Status();
 }
 
 Status check_network_fits(const Avatar& avatar, const Budget& budget) {
-  const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, true);
+  const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, false);
   if (avatar.network.input_size > kMaxUvSize) {
     return over_limit("network.input_size", "is larger than ", kMaxUvSize);
   }
@@ -172,6 +219,11 @@ Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFr
   if (const Status status = validate_pose({out.root_translation_m, out.rotations}, static_cast<uint32_t>(joints)); !status.ok()) {
     return corrupt("golden", status.message());
   }
+  out.fixed_point_hash = {table.fixed_point_hash_low(), table.fixed_point_hash_high()};
+  if (table.fixed_point_library() != nullptr) {
+    FIG_RETURN_IF_ERROR(
+        read_text(table.fixed_point_library(), "golden.fixed_point_library", layout::kMaxNameBytes, out.fixed_point_library));
+  }
   FIG_RETURN_IF_ERROR(blobs.read("golden.png", {BlobReader::kAny}, out.png, BlobReader::kMayBeAbsent));
   return out.png.empty() ? Status() : check_png(out.png, out.camera);
 }
@@ -194,10 +246,13 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
   FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), out.map_statistics));
   out.fourier_octaves = table.fourier_octaves();
   FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), out.decoding));
-  FIG_RETURN_IF_ERROR(read_network(*table.network(), blobs, out.network));
+  FIG_RETURN_IF_ERROR(read_network(table, blobs, out));
   FIG_RETURN_IF_ERROR(check_network_fits(out, budget));
   if (table.pose_statistics() != nullptr) FIG_RETURN_IF_ERROR(read_pose_statistics(*table.pose_statistics(), blobs, out.pose_statistics));
   if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden(*table.golden(), blobs, out.golden));
+  if (out.fixed_point.empty() && out.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
+    return corrupt("golden.fixed_point_hash", "is there, a network in fixed point is not");
+  }
   return {};
 }
 

@@ -159,7 +159,9 @@ template <class T>
 Status BlobReader::read(std::string_view name, std::initializer_list<uint32_t> shape, std::span<const T>& out, Presence presence) {
   constexpr DataType kType = std::is_same_v<T, float>     ? DataType::kF32
                              : std::is_same_v<T, uint8_t> ? DataType::kU8
+                             : std::is_same_v<T, int8_t>  ? DataType::kI8
                              : std::is_same_v<T, int16_t> ? DataType::kI16
+                             : std::is_same_v<T, int32_t> ? DataType::kI32
                                                           : DataType::kU32;
   const BlobView* blob = nullptr;
   FIG_RETURN_IF_ERROR(find(name, kType, shape, presence, blob));
@@ -169,7 +171,9 @@ Status BlobReader::read(std::string_view name, std::initializer_list<uint32_t> s
 
 template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const float>&, Presence);
 template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const uint8_t>&, Presence);
+template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const int8_t>&, Presence);
 template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const int16_t>&, Presence);
+template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const int32_t>&, Presence);
 template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const uint32_t>&, Presence);
 
 Status BlobReader::check_all_known() const {

@@ -32,8 +32,7 @@ struct Header {
 static_assert(sizeof(Header) == kPackageHeaderBytes && offsetof(Header, header_checksum) == 56);
 inline constexpr size_t kSealedHeaderBytes = offsetof(Header, header_checksum);
 
-// Version 1 defines no feature bits.
-inline constexpr uint64_t kKnownRequiredFeatures = 0;
+inline constexpr uint64_t kKnownRequiredFeatures = kFeatureFixedPoint;
 
 // The first multiple of the blob alignment at or after the offset. Offsets are below 2^63.
 constexpr uint64_t align_up(uint64_t offset) { return (offset + (kBlobAlignment - 1)) / kBlobAlignment * kBlobAlignment; }

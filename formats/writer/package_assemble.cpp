@@ -53,7 +53,16 @@ Offset<schema::GoldenFrame> build_golden(FlatBufferBuilder& b, const GoldenFrame
                               flatbuffers::span<const float, 12>(c.view_from_world.data(), 12));
   const auto vec3 = [](const std::array<float, 3>& v) { return schema::Vec3(v[0], v[1], v[2]); };
   const schema::Vec3 translation = vec3(golden.root_translation_m), background = vec3(golden.background);
-  return schema::CreateGoldenFrame(b, &translation, &camera, &background);
+  Offset<flatbuffers::String> library = 0;
+  if (!golden.fixed_point_library.empty()) library = b.CreateString(golden.fixed_point_library);
+  return schema::CreateGoldenFrame(b, &translation, &camera, &background, golden.fixed_point_hash[0], golden.fixed_point_hash[1], library);
+}
+
+Offset<schema::FixedPoint> build_fixed_point(FlatBufferBuilder& b, const FixedPointNetwork& fixed) {
+  if (fixed.empty()) return 0;
+  std::vector<schema::Quantisation> values;
+  for (const Quantisation& value : fixed.values) values.emplace_back(value.scale, value.zero_point);
+  return schema::CreateFixedPoint(b, b.CreateVectorOfStructs(values));
 }
 
 Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
@@ -72,9 +81,10 @@ Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
     pose_statistics = schema::CreatePoseStatistics(b, b.CreateVector(avatar.pose_statistics.joints));
   }
   const auto golden = build_golden(b, avatar.golden);
+  const auto fixed_point = build_fixed_point(b, avatar.fixed_point);
   return schema::CreateAvatar(b, body_name, avatar.body_hash[0], avatar.body_hash[1], preset,
                               static_cast<schema::TemplateMode>(avatar.template_mode), &statistics, avatar.fourier_octaves, decoding,
-                              network, pose_statistics, golden)
+                              network, pose_statistics, golden, fixed_point)
       .Union();
 }
 

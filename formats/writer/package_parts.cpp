@@ -37,12 +37,36 @@ class PartList {
  private:
   static DataType type_of(float) { return DataType::kF32; }
   static DataType type_of(uint8_t) { return DataType::kU8; }
+  static DataType type_of(int8_t) { return DataType::kI8; }
   static DataType type_of(int16_t) { return DataType::kI16; }
+  static DataType type_of(int32_t) { return DataType::kI32; }
   static DataType type_of(uint32_t) { return DataType::kU32; }
 
   std::vector<BlobPart>& blobs_;
   Status status_;
 };
+
+void add_float_weights(const Network& network, const std::vector<ValueShape>& shapes, PartList& list) {
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    const Layer& layer = network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    const std::string name = "network." + std::to_string(i);
+    list.add(name + ".weights", layer.weights, {layer.kernel, layer.kernel, shapes[layer.inputs[0]].channels}, layer.out_channels);
+    list.add(name + ".bias", layer.bias, {}, layer.out_channels);
+  }
+}
+
+void add_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& shapes, PartList& list) {
+  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
+    const Layer& layer = avatar.network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    const FixedPointConvolution& convolution = avatar.fixed_point.convolutions[i];
+    const std::string name = "fixed." + std::to_string(i);
+    list.add(name + ".weights", convolution.weights, {layer.kernel, layer.kernel, shapes[layer.inputs[0]].channels}, layer.out_channels);
+    list.add(name + ".scale", convolution.weight_scale, {}, layer.out_channels);
+    list.add(name + ".bias", convolution.bias, {}, layer.out_channels);
+  }
+}
 
 }  // namespace
 
@@ -70,16 +94,18 @@ Result<PackageParts> take_apart(const Body& body, const Provenance& provenance) 
 Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget, const Provenance& provenance) {
   PackageParts parts{.kind = PackageKind::kAvatar, .content = &avatar, .budget = budget, .provenance = provenance};
   // The list's shapes say how the weights are laid out; their number is checked against them here, their values by the reader.
-  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, true);
+  const bool has_floats = avatar.holds(Precision::kFloat32) || avatar.fixed_point.empty();
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, has_floats);
   if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
   PartList list(parts.blobs);
   list.add("avatar.shape", avatar.shape);
-  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
-    const Layer& layer = avatar.network.layers[i];
-    if (layer.op != LayerOp::kConv2d) continue;
-    const std::string name = "network." + std::to_string(i);
-    list.add(name + ".weights", layer.weights, {layer.kernel, layer.kernel, (*shapes)[layer.inputs[0]].channels}, layer.out_channels);
-    list.add(name + ".bias", layer.bias, {}, layer.out_channels);
+  if (has_floats) add_float_weights(avatar.network, *shapes, list);
+  if (!avatar.fixed_point.empty()) {
+    parts.required_features |= kFeatureFixedPoint;
+    if (avatar.fixed_point.convolutions.size() != avatar.network.layers.size()) {
+      return Status(StatusCode::kInvalidArgument, "avatar.fixed_point: not one entry per layer");
+    }
+    add_fixed_point(avatar, *shapes, list);
   }
   if (const size_t features = avatar.pose_statistics.joints.size() * 3; features != 0) {
     list.add("pose.mean", avatar.pose_statistics.mean, {}, features);

@@ -64,7 +64,7 @@ void expect_refused(const Outcome& run, const std::string& words) {
 }
 
 TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
-  for (const std::string kind : {"body", "avatar", "motion"}) {
+  for (const std::string kind : {"body", "avatar", "fixed_point_avatar", "motion"}) {
     const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");
@@ -82,6 +82,13 @@ TEST(Inspect, PrintsWhatADeviceNeedsToKnow) {
     EXPECT_TRUE(contains(avatar.out, words)) << words << "\n" << avatar.out;
   }
   EXPECT_FALSE(contains(avatar.out, "network.0.weights"));
+  const Outcome fixed = inspect("fixed_point_avatar_v1.fgn --tensors");
+  for (const char* words :
+       {"precision         q8", "in fixed point 55556666777788881111222233334444 by sample library 1", "fixed.0.weights", "i8 ",
+        "input int16             0.000244141     0", "0     conv 3x3 relu           0.125  -128", "23    conv 1x1                float"}) {
+    EXPECT_TRUE(contains(fixed.out, words)) << words << "\n" << fixed.out;
+  }
+  EXPECT_FALSE(contains(avatar.out + inspect("avatar_v1.fgn --tensors").out, "weight scale"));
   const Outcome body = inspect("body_v1.fgn --tensors");
   for (const char* words : {"0 pelvis  1 spine1  2 head", "rest pose", "8x8 texels, 5 covered, 3 border", "body.texel_weights", "[5,8]"}) {
     EXPECT_TRUE(contains(body.out, words)) << words << "\n" << body.out;

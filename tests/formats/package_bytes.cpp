@@ -68,7 +68,7 @@ void renew_what_looks_like_a_package(std::span<std::byte> bytes) {
   layout::Header header = get_header(bytes);
   header.magic = layout::kMagic;
   header.version = kPackageVersion;
-  header.required_features = 0;
+  header.required_features &= layout::kKnownRequiredFeatures;
   header.file_bytes = bytes.size();
   header.index_offset = kPackageHeaderBytes;
   const size_t index_bytes = std::min<size_t>(header.index_bytes, bytes.size() - kPackageHeaderBytes);
@@ -124,13 +124,23 @@ bool exercise_body(const Body& body, std::string& reason) {
   return all_finite(maps) && all_finite(joints) && all_finite(texels);
 }
 
+bool exercise_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& shapes) {
+  if (!avatar.holds(Precision::kFixedPoint)) return avatar.holds(Precision::kFloat32);
+  if (!validate_fixed_point(avatar.network, avatar.fixed_point).ok()) return false;
+  if (count_macs(avatar.network, shapes) > 10'000'000) return true;  // a mutation may ask for hours
+  const std::vector<int16_t> input(size_t{shapes[0].size} * shapes[0].size * shapes[0].channels, -32767);
+  return all_finite(evaluate_fixed_point(avatar.network, avatar.fixed_point, input).result);
+}
+
 bool exercise_avatar(const Avatar& avatar, std::string& reason) {
   reason = "shapes or weights of the network";
-  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, true);
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, avatar.holds(Precision::kFloat32));
   if (!shapes.ok() || shapes->back().channels != head_channels(avatar.decoding.sh_degree)) return false;
   for (const Layer& layer : avatar.network.layers) {
     if (!all_finite(layer.weights) || !all_finite(layer.bias)) return false;
   }
+  reason = "a network in fixed point";
+  if (!exercise_fixed_point(avatar, *shapes)) return false;
   reason = "shape or pose statistics";
   const size_t features = avatar.pose_statistics.joints.size() * 3;
   if (avatar.pose_statistics.mean.size() != features || avatar.pose_statistics.covariance.size() != features * features) return false;

@@ -14,13 +14,14 @@
 namespace figurine {
 namespace {
 
+using samples::SampleKind;
 using Bytes = std::vector<std::byte>;
 
-std::string golden_path(PackageKind kind) {
-  return std::string(FIGURINE_SOURCE_DIR "/tests/golden/packages/") + to_string(kind) + "_v1.fgn";
+std::string golden_path(SampleKind kind) {
+  return std::string(FIGURINE_SOURCE_DIR "/tests/golden/packages/") + samples::to_string(kind) + "_v1.fgn";
 }
 
-Bytes read_golden(PackageKind kind) {
+Bytes read_golden(SampleKind kind) {
   std::ifstream file(golden_path(kind), std::ios::binary);
   EXPECT_TRUE(file.good()) << golden_path(kind);
   const std::vector<char> chars{std::istreambuf_iterator<char>(file), {}};
@@ -28,21 +29,9 @@ Bytes read_golden(PackageKind kind) {
   return {begin, begin + chars.size()};
 }
 
-Bytes write_sample(PackageKind kind) {
-  switch (kind) {
-    case PackageKind::kBody:
-      return *samples::BodySample().write();
-    case PackageKind::kAvatar:
-      return *samples::AvatarSample().write();
-    case PackageKind::kMotion:
-      return *samples::MotionSample().write();
-  }
-  return {};
-}
-
 TEST(PackageGolden, TodaysWriterMakesTheGoldenBytes) {
-  for (PackageKind kind : {PackageKind::kBody, PackageKind::kAvatar, PackageKind::kMotion}) {
-    const Bytes bytes = write_sample(kind);
+  for (SampleKind kind : samples::kSampleKinds) {
+    const Bytes bytes = *write_sample(kind);
     if (std::getenv("FIGURINE_UPDATE_GOLDEN") != nullptr) {
       std::ofstream(golden_path(kind), std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
     }
@@ -52,14 +41,15 @@ TEST(PackageGolden, TodaysWriterMakesTheGoldenBytes) {
 
 TEST(PackageGolden, TodaysReaderReadsTheGoldenBytes) {
   // Content hashes by value: neither the files nor the hash may drift.
-  const std::pair<PackageKind, const char*> expected[] = {{PackageKind::kBody, "8b8f9367898ad7d574f353e6b0b69ae7"},
-                                                          {PackageKind::kAvatar, "df4f0fdc16bf4abc2a392347c9560484"},
-                                                          {PackageKind::kMotion, "4c9a33c1c2bc8e307e13fe60efd5964d"}};
+  const std::pair<SampleKind, const char*> expected[] = {{SampleKind::kBody, "8b8f9367898ad7d574f353e6b0b69ae7"},
+                                                         {SampleKind::kAvatar, "df4f0fdc16bf4abc2a392347c9560484"},
+                                                         {SampleKind::kFixedPointAvatar, "5f5e04dbda2fb6ac6e9152773c882959"},
+                                                         {SampleKind::kMotion, "4c9a33c1c2bc8e307e13fe60efd5964d"}};
   for (const auto& [kind, hash] : expected) {
     const samples::ExactBytes bytes(read_golden(kind));
     const Result<Package> package = Package::open(bytes.bytes(), golden_path(kind));
     ASSERT_TRUE(package.ok()) << package.status().message();
-    EXPECT_EQ(package->kind(), kind);
+    EXPECT_EQ(package->kind(), package_kind(kind));
     EXPECT_EQ(format_hash(package->content_hash()), hash);
     std::string reason;
     EXPECT_TRUE(samples::exercise(*package, reason)) << reason;

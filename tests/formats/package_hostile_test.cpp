@@ -12,8 +12,6 @@
 namespace figurine {
 namespace {
 
-using samples::AvatarSample;
-using samples::BodySample;
 using samples::ExactBytes;
 using samples::get_header;
 using samples::get_u64;
@@ -21,6 +19,7 @@ using samples::GuardedBytes;
 using samples::MotionSample;
 using samples::put_header;
 using samples::put_u64;
+using samples::SampleKind;
 using samples::Seal;
 
 using Bytes = std::vector<std::byte>;
@@ -38,23 +37,13 @@ void expect_refused(const Status& status, StatusCode code, const std::string& wo
   EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
 }
 
-class PackageOpen : public testing::TestWithParam<PackageKind> {
+class PackageOpen : public testing::TestWithParam<SampleKind> {
  protected:
-  Bytes sound() const {
-    switch (GetParam()) {
-      case PackageKind::kBody:
-        return *BodySample().write();
-      case PackageKind::kAvatar:
-        return *AvatarSample().write();
-      case PackageKind::kMotion:
-        return *MotionSample().write();
-    }
-    return {};
-  }
+  Bytes sound() const { return *write_sample(GetParam()); }
 };
 
-INSTANTIATE_TEST_SUITE_P(EachKind, PackageOpen, testing::Values(PackageKind::kBody, PackageKind::kAvatar, PackageKind::kMotion),
-                         [](const auto& kind) { return to_string(kind.param); });
+INSTANTIATE_TEST_SUITE_P(EachKind, PackageOpen, testing::ValuesIn(samples::kSampleKinds),
+                         [](const auto& kind) { return samples::to_string(kind.param); });
 
 TEST_P(PackageOpen, RejectsEveryPrefix) {
   const Bytes bytes = sound();
@@ -114,13 +103,15 @@ TEST_P(PackageOpen, RejectsOtherVersions) {
 }
 
 TEST_P(PackageOpen, RejectsEachUnknownRequiredFeatureAndIgnoresOptionalOnes) {
+  const uint64_t own = get_header(sound()).required_features;
   for (int bit = 0; bit < 64; ++bit) {
     Bytes bytes = sound();
     layout::Header header = get_header(bytes);
-    header.required_features = uint64_t{1} << bit;
+    header.required_features = own ^ uint64_t { 1 } << bit;
     put_header(bytes, header);
-    expect_refused(open_status(bytes), StatusCode::kUnsupported, "header.required_features");
-    header.required_features = 0;
+    const bool known = (layout::kKnownRequiredFeatures >> bit & 1) != 0;  // and not what the package holds
+    expect_refused(open_status(bytes), known ? StatusCode::kCorrupt : StatusCode::kUnsupported, "header.required_features");
+    header.required_features = own;
     header.optional_features = uint64_t{1} << bit;
     put_header(bytes, header);
     EXPECT_TRUE(open_status(bytes).ok()) << bit;
@@ -128,7 +119,7 @@ TEST_P(PackageOpen, RejectsEachUnknownRequiredFeatureAndIgnoresOptionalOnes) {
 }
 
 TEST_P(PackageOpen, RejectsOtherKinds) {
-  const uint32_t own = uint32_t(GetParam());
+  const uint32_t own = uint32_t(samples::package_kind(GetParam()));
   for (uint32_t kind : {0u, 1u, 2u, 3u, 4u, 5u, UINT32_MAX}) {
     Bytes bytes = sound();
     layout::Header header = get_header(bytes);
@@ -309,7 +300,7 @@ TEST(PackageBlobs, RejectsOtherShapesAndTypesOfKnownBlobs) {
   expect_refused(with({3, 8}, DataType::kF32), StatusCode::kCorrupt, "motion.rotations: has shape [3,8], expected [3,2,4]");
   expect_refused(with({2, 3, 4}, DataType::kF32), StatusCode::kCorrupt, "motion.rotations: has shape");
   expect_refused(with({3, 2, 4}, DataType::kU32), StatusCode::kCorrupt, "motion.rotations: is u32, not f32");
-  expect_refused(with({3, 2, 4}, static_cast<DataType>(4)), StatusCode::kUnsupported, "element type 4 is unknown");
+  expect_refused(with({3, 2, 4}, static_cast<DataType>(6)), StatusCode::kUnsupported, "element type 6 is unknown");
 }
 
 TEST(PackageLimits, RejectsIndicesThatCostTooMuch) {

@@ -17,6 +17,7 @@ namespace {
 using samples::AvatarSample;
 using samples::BodySample;
 using samples::ExactBytes;
+using samples::FixedPointAvatarSample;
 using samples::MotionSample;
 using samples::Seal;
 
@@ -170,6 +171,78 @@ TEST(PackageAvatar, RejectsLayersBehindTheWritersBack) {
   expect_refused(with([](Network& n) { n.layers.resize(kMaxLayers + 1); }), "network: more than 256 layers", StatusCode::kLimitExceeded);
   expect_refused(with([](Network& n) { n.input_size = 9; }), "pools an odd size");
   expect_refused(with([](Network& n) { n.input_channels = 0; }), "network: input size or channels");
+}
+
+TEST(PackageAvatar, RejectsFixedPointWhoseArithmeticIsNotDefined) {
+  using Bend = std::function<void(FixedPointAvatarSample&)>;
+  const auto bent = [](const Bend& bend) { return ::figurine::bent<FixedPointAvatarSample>(bend); };
+  for (const float scale : {0.0f, -0.125f, kNan, kInfinity, std::numeric_limits<float>::denorm_min()}) {
+    expect_refused(bent([&](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[1].scale = scale; }),
+                   "fixed point: value 1: the scale");
+    expect_refused(bent([&](FixedPointAvatarSample& s) { s.fixed_scales[0][1] = scale; }),
+                   "fixed point: layer 0: output 1: the weights' scale");
+  }
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[1].zero_point = -129; }), "value 1: the zero point");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[0].zero_point = 1; }), "value 0: the zero point");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.fixed_weights[0][7] = -128; }), "layer 0: output 0: a weight is -128");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.fixed_biases[0][1] = INT32_MAX; }), "layer 0: output 1: a sum can overflow int32");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[3].scale = 0.25f; }), "do not share one quantisation");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values.pop_back(); }), "fixed point: not one entry per layer");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.network.layers.back().relu = true; }), "without ReLU");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values.resize(300); }), "more than 256 values",
+                 StatusCode::kLimitExceeded);
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.golden.fixed_point_library = "two\nlines"; }), "golden.fixed_point_library");
+}
+
+TEST(PackageAvatar, RejectsNetworksThatAreThereInPart) {
+  const auto without = [](const std::string& name, bool with_floats) {
+    FixedPointAvatarSample sample;
+    if (with_floats) sample.with_floats();
+    PackageParts parts = *take_apart(sample.avatar, sample.budget, {});
+    EXPECT_EQ(std::erase_if(parts.blobs, [&](const BlobPart& blob) { return blob.name == name; }), 1u) << name;
+    const ExactBytes bytes(assemble(parts));
+    return Package::open(bytes.bytes(), "bent.fgn").status();
+  };
+  expect_refused(without("network.0.weights", true), "network.0.weights: is missing, while others are there");
+  expect_refused(without("network.23.weights", true), "network.23.weights: is missing, while others are there");
+  expect_refused(without("network.4.bias", true), "network.4.bias: is missing, while others are there");
+  for (const char* name : {"fixed.0.weights", "fixed.0.scale", "fixed.23.bias"}) {
+    expect_refused(without(name, false), std::string(name) + ": is missing");
+  }
+}
+
+TEST(PackageAvatar, TheHeaderAndTheGoldenHashAgreeWithTheNetwork) {
+  const auto with = [](auto& sample, const std::function<void(PackageParts&, Avatar&)>& bend) {
+    PackageParts parts = *take_apart(sample.avatar, sample.budget, {});
+    bend(parts, sample.avatar);
+    const ExactBytes bytes(assemble(parts));
+    return Package::open(bytes.bytes(), "bent.fgn").status();
+  };
+  AvatarSample floats, hashed;
+  FixedPointAvatarSample fixed;
+  expect_refused(with(floats, [](PackageParts& parts, Avatar&) { parts.required_features = kFeatureFixedPoint; }),
+                 "the bit of fixed point is set, such a network is not there");
+  expect_refused(with(fixed, [](PackageParts& parts, Avatar&) { parts.required_features = 0; }),
+                 "the bit of fixed point is not set, such a network is there");
+  expect_refused(with(hashed, [](PackageParts&, Avatar& avatar) { avatar.golden.fixed_point_hash[1] = 1; }), "golden.fixed_point_hash");
+}
+
+TEST(PackageAvatar, RejectsFixedPointBehindTheWritersBack) {
+  const auto with = [](const std::string& name, const std::function<void(BlobPart&)>& bend) {
+    FixedPointAvatarSample sample;
+    PackageParts parts = *take_apart(sample.avatar, sample.budget, {});
+    for (BlobPart& blob : parts.blobs) {
+      if (blob.name == name) bend(blob);
+    }
+    const ExactBytes bytes(assemble(parts));
+    return Package::open(bytes.bytes(), "bent.fgn").status();
+  };
+  expect_refused(with("fixed.0.weights", [](BlobPart& blob) { blob.type = DataType::kU8; }), "fixed.0.weights: is u8, not i8");
+  expect_refused(with("fixed.0.bias", [](BlobPart& blob) { blob.type = DataType::kU32; }), "fixed.0.bias: is u32, not i32");
+  expect_refused(with("fixed.0.weights", [](BlobPart& blob) { blob.shape = {180}; }),
+                 "fixed.0.weights: has shape [180], expected [2,3,3,10]");
+  expect_refused(with("fixed.0.scale", [](BlobPart& blob) { blob.bytes = blob.bytes.first(4), blob.shape = {1}; }),
+                 "fixed.0.scale: has shape [1], expected [2]");
 }
 
 TEST(PackageAvatar, RejectsDecodingsThatCannotBe) {

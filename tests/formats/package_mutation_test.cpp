@@ -101,15 +101,13 @@ void mutate(Bytes& bytes, const Seal& seal, Random& random) {
   }
 }
 
-class PackageMutation : public testing::TestWithParam<PackageKind> {};
+class PackageMutation : public testing::TestWithParam<samples::SampleKind> {};
 
-INSTANTIATE_TEST_SUITE_P(EachKind, PackageMutation, testing::Values(PackageKind::kBody, PackageKind::kAvatar, PackageKind::kMotion),
-                         [](const auto& kind) { return to_string(kind.param); });
+INSTANTIATE_TEST_SUITE_P(EachKind, PackageMutation, testing::ValuesIn(samples::kSampleKinds),
+                         [](const auto& kind) { return samples::to_string(kind.param); });
 
 TEST_P(PackageMutation, NeverBreaksAPromise) {
-  const Result<Bytes> sound = GetParam() == PackageKind::kBody     ? samples::BodySample().write()
-                              : GetParam() == PackageKind::kAvatar ? samples::AvatarSample().write()
-                                                                   : samples::MotionSample().write();
+  const Result<Bytes> sound = write_sample(GetParam());
   ASSERT_TRUE(sound.ok()) << sound.status().message();
   const Seal seal(*sound);
   const GuardedBytes guarded(sound->size() + 4096);

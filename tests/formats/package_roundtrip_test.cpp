@@ -136,6 +136,42 @@ TEST(PackageRoundTrip, AvatarKeepsEveryField) {
   expect_same(samples::make_provenance(), opened.package.provenance());
 }
 
+void expect_same_fixed_point(const Opened& opened, const Avatar& in) {
+  const Avatar& out = opened.package.avatar();
+  EXPECT_EQ(in.fixed_point.values, out.fixed_point.values);
+  ASSERT_EQ(in.fixed_point.convolutions.size(), out.fixed_point.convolutions.size());
+  for (size_t i = 0; i < in.fixed_point.convolutions.size(); ++i) {
+    const FixedPointConvolution &a = in.fixed_point.convolutions[i], &b = out.fixed_point.convolutions[i];
+    EXPECT_TRUE(same(a.weights, b.weights));
+    EXPECT_TRUE(same(a.weight_scale, b.weight_scale));
+    EXPECT_TRUE(same(a.bias, b.bias));
+    if (!b.weights.empty()) expect_view(opened, b.weights);
+  }
+  EXPECT_EQ(in.golden.fixed_point_hash, out.golden.fixed_point_hash);
+  EXPECT_EQ(in.golden.fixed_point_library, out.golden.fixed_point_library);
+  EXPECT_EQ(opened.package.required_features(), kFeatureFixedPoint);
+}
+
+TEST(PackageRoundTrip, AnAvatarHoldsFloatsFixedPointOrBoth) {
+  const Opened floats = open_or_die(AvatarSample().write());
+  EXPECT_TRUE(floats.package.avatar().holds(Precision::kFloat32));
+  EXPECT_FALSE(floats.package.avatar().holds(Precision::kFixedPoint));
+  EXPECT_EQ(floats.package.required_features(), 0u);
+
+  const samples::FixedPointAvatarSample fixed;
+  const Opened alone = open_or_die(fixed.write());
+  EXPECT_FALSE(alone.package.avatar().holds(Precision::kFloat32));
+  EXPECT_TRUE(alone.package.avatar().holds(Precision::kFixedPoint));
+  expect_same_fixed_point(alone, fixed.avatar);
+
+  samples::FixedPointAvatarSample both;
+  const Opened two = open_or_die(both.with_floats().write());
+  EXPECT_TRUE(two.package.avatar().holds(Precision::kFloat32));
+  EXPECT_TRUE(two.package.avatar().holds(Precision::kFixedPoint));
+  expect_same_fixed_point(two, both.avatar);
+  EXPECT_TRUE(same(both.avatar.network.layers[0].weights, two.package.avatar().network.layers[0].weights));
+}
+
 TEST(PackageRoundTrip, MotionKeepsEveryField) {
   const MotionSample sample;
   const Opened opened = open_or_die(sample.write());

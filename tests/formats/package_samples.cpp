@@ -108,6 +108,71 @@ AvatarSample::AvatarSample() {
   budget = {.peak_memory_bytes = 1 << 20, .macs_per_frame = count_macs(avatar.network, shapes), .gaussians = 5};
 }
 
+FixedPointAvatarSample::FixedPointAvatarSample() {
+  avatar.name = "sample avatar in fixed point";
+  const size_t count = avatar.network.layers.size();
+  // One quantisation for all that pool, upsample and concatenation tie together; the first value is tied to nothing.
+  avatar.fixed_point.values.assign(count, {.scale = 0.0625f, .zero_point = -3});
+  avatar.fixed_point.values[0] = {.scale = 0x1p-12f, .zero_point = 0};
+  avatar.fixed_point.values[1] = {.scale = 0.125f, .zero_point = -128};
+  avatar.fixed_point.convolutions.resize(count);
+  fixed_weights.resize(count);
+  fixed_scales.resize(count);
+  fixed_biases.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    Layer& layer = avatar.network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    for (size_t k = 0; k < layer.weights.size(); ++k) fixed_weights[i].push_back(static_cast<int8_t>(int(k * 37 + i) % 255 - 127));
+    for (uint32_t o = 0; o < layer.out_channels; ++o) {
+      fixed_scales[i].push_back(0.00390625f * static_cast<float>(o % 3 + 1));
+      fixed_biases[i].push_back(static_cast<int32_t>(o * 101) - 200);
+    }
+    avatar.fixed_point.convolutions[i] = {fixed_weights[i], fixed_scales[i], fixed_biases[i]};
+    layer.weights = layer.bias = {};
+  }
+  avatar.golden.fixed_point_hash = {0x1111222233334444u, 0x5555666677778888u};
+  avatar.golden.fixed_point_library = "sample library 1";
+}
+
+FixedPointAvatarSample& FixedPointAvatarSample::with_floats() {
+  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
+    avatar.network.layers[i].weights = weights[i];
+    avatar.network.layers[i].bias = biases[i];
+  }
+  return *this;
+}
+
+std::string to_string(SampleKind kind) {
+  return kind == SampleKind::kFixedPointAvatar ? "fixed_point_avatar" : figurine::to_string(package_kind(kind));
+}
+
+PackageKind package_kind(SampleKind kind) {
+  switch (kind) {
+    case SampleKind::kBody:
+      return PackageKind::kBody;
+    case SampleKind::kAvatar:
+    case SampleKind::kFixedPointAvatar:
+      return PackageKind::kAvatar;
+    case SampleKind::kMotion:
+      return PackageKind::kMotion;
+  }
+  return {};
+}
+
+Result<std::vector<std::byte>> write_sample(SampleKind kind) {
+  switch (kind) {
+    case SampleKind::kBody:
+      return BodySample().write();
+    case SampleKind::kAvatar:
+      return AvatarSample().write();
+    case SampleKind::kFixedPointAvatar:
+      return FixedPointAvatarSample().write();
+    case SampleKind::kMotion:
+      return MotionSample().write();
+  }
+  return Status(StatusCode::kInvalidArgument, "no such sample");
+}
+
 MotionSample::MotionSample() {
   root_translation = patterned(3 * 3);
   for (uint32_t frame = 0; frame < 3; ++frame) {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "figurine/package.h"
@@ -43,6 +44,16 @@ struct AvatarSample {
   Result<std::vector<std::byte>> write() const { return write_package(avatar, budget, make_provenance()); }
 };
 
+// The same avatar in fixed point alone; with_floats() gives it back its float weights.
+struct FixedPointAvatarSample : AvatarSample {
+  FixedPointAvatarSample();
+  std::vector<std::vector<int8_t>> fixed_weights;
+  std::vector<std::vector<float>> fixed_scales;
+  std::vector<std::vector<int32_t>> fixed_biases;
+
+  FixedPointAvatarSample& with_floats();
+};
+
 struct MotionSample {
   MotionSample();
   MotionSample(const MotionSample&) = delete;
@@ -51,5 +62,12 @@ struct MotionSample {
 
   Result<std::vector<std::byte>> write() const { return write_package(motion, make_provenance()); }
 };
+
+// One of each, for tests of what all packages have in common.
+enum class SampleKind { kBody, kAvatar, kFixedPointAvatar, kMotion };
+inline constexpr SampleKind kSampleKinds[] = {SampleKind::kBody, SampleKind::kAvatar, SampleKind::kFixedPointAvatar, SampleKind::kMotion};
+std::string to_string(SampleKind kind);  // also the name of its golden file: "fixed_point_avatar"
+PackageKind package_kind(SampleKind kind);
+Result<std::vector<std::byte>> write_sample(SampleKind kind);
 
 }  // namespace figurine::samples

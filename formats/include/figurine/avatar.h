@@ -38,6 +38,7 @@ struct PoseStatistics {
 
 // In which arithmetic a network is evaluated.
 enum class Precision : uint8_t { kFloat32, kFixedPoint };
+const char* to_string(Precision precision);  // "f32", "q8"
 
 struct GoldenFrame {
   std::array<float, 3> root_translation_m{0, 0, 0};
@@ -47,6 +48,7 @@ struct GoldenFrame {
   std::span<const uint8_t> png;  // 8-bit RGB of the trainer's renderer over the background; may be empty
   // XXH3-128 (low, high) of the frame in fixed point: RGBA8 rows over the background, equal on every CPU. Zero: none.
   std::array<uint64_t, 2> fixed_point_hash{0, 0};
+  std::string fixed_point_library;  // the network library that the hash was made with, for people
 };
 
 struct Avatar {
@@ -63,6 +65,9 @@ struct Avatar {
   FixedPointNetwork fixed_point;  // empty if the package has none
   PoseStatistics pose_statistics;
   GoldenFrame golden;
+
+  // A package holds one or both.
+  bool holds(Precision precision) const { return precision == Precision::kFixedPoint ? !fixed_point.empty() : has_weights(network); }
 };
 
 }  // namespace figurine

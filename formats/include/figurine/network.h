@@ -50,6 +50,8 @@ Result<std::vector<ValueShape>> infer_shapes(const Network& network, bool check_
 // Multiply-accumulates of one evaluation (convolutions only).
 uint64_t count_macs(const Network& network, const std::vector<ValueShape>& shapes);
 uint64_t count_parameters(const Network& network);
+// Whether any convolution has its float weights; a sound network has all or none.
+bool has_weights(const Network& network);
 
 // The pose UNet (docs/numerics.md, "Network"): four resolutions, C channels, two 3x3 convolutions each on the way down, three up-steps of
 // upsample, concat [skip, up], 3x3 2C -> C, 3x3 C -> C, and a 1x1 head. 15 convolutions; weights are left empty.

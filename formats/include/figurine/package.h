@@ -26,10 +26,13 @@ inline constexpr uint32_t kPackageVersion = 1;
 inline constexpr size_t kPackageHeaderBytes = 64;
 inline constexpr size_t kBlobAlignment = 64;
 
+// Bits of the header's required features.
+inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1} << 0;  // an avatar's network is there in fixed point
+
 enum class PackageKind : uint8_t { kBody = 1, kAvatar = 2, kMotion = 3 };
 const char* to_string(PackageKind kind);
 
-enum class DataType : uint8_t { kF32 = 0, kU8 = 1, kI16 = 2, kU32 = 3 };
+enum class DataType : uint8_t { kF32 = 0, kU8 = 1, kI16 = 2, kU32 = 3, kI8 = 4, kI32 = 5 };
 const char* to_string(DataType type);
 size_t size_bytes(DataType type);
 
