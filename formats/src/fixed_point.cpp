@@ -45,10 +45,8 @@ Status validate_convolution(const Network& network, const FixedPointNetwork& fix
     }
     if (bound > std::numeric_limits<int32_t>::max()) return corrupt(i, channel + "a sum can overflow int32");
     const float input_scale = fixed.values[layer.inputs[0]].scale;
-    if (is_last) {
-      if (!is_scale(input_scale * convolution.weight_scale[o])) return corrupt(i, channel + "the result's scale is out of range");
-      continue;
-    }
+    if (!is_scale(input_scale * convolution.weight_scale[o])) return corrupt(i, channel + "the scale of the sums is out of range");
+    if (is_last) continue;
     const float multiplier = requantisation_multiplier(input_scale, convolution.weight_scale[o], fixed.values[i + 1].scale);
     if (!(multiplier >= 0x1p-32f && multiplier < 256)) return corrupt(i, channel + "the multiplier is not within 2^-32 and 256");
   }

@@ -69,6 +69,8 @@ const char* to_string(Stage stage) {
   return "unknown stage";
 }
 
+const char* network_library() { return "XNNPACK " FIGURINE_XNNPACK_VERSION; }
+
 struct Renderer::Impl {
   Impl(ThreadPool&& threads, uint64_t (*clock)()) : pool(std::move(threads)), now_ns(clock), rasterizer(pool) {}
 
@@ -129,17 +131,23 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
   return renderer;
 }
 
-Result<AvatarId> Renderer::add_avatar(const Package& avatar, const Package& body) {
+Result<AvatarId> Renderer::add_avatar(const Package& avatar, const Package& body, std::optional<Precision> precision) {
   if (avatar.kind() != PackageKind::kAvatar)
     return Status(StatusCode::kMismatch, std::string("an avatar is wanted, not a ") + to_string(avatar.kind()));
   if (body.kind() != PackageKind::kBody)
     return Status(StatusCode::kMismatch, std::string("a body is wanted, not a ") + to_string(body.kind()));
   FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar.avatar(), body));
-  Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(avatar.avatar(), body.body(), impl_->pool);
+  const Precision held = avatar.avatar().holds(Precision::kFixedPoint) ? Precision::kFixedPoint : Precision::kFloat32;
+  Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(avatar.avatar(), body.body(), precision.value_or(held), impl_->pool);
   if (!posed.ok()) return posed.status();
   if (!impl_->gaussians.ensure(body.body().texel_count(), (*posed)->sh_degree())) return out_of_memory("an avatar's Gaussians");
   impl_->avatars.push_back(std::move(posed).value());
   return AvatarId(impl_->avatars.size() - 1);
+}
+
+Precision Renderer::precision(AvatarId avatar) const {
+  FIG_CHECK(static_cast<size_t>(avatar) < impl_->avatars.size(), "an avatar that was added");
+  return impl_->avatars[static_cast<size_t>(avatar)]->precision();
 }
 
 Status Renderer::render(const Frame& frame, const ImageTarget& target) {

@@ -77,46 +77,48 @@ TEST(Allocation, TheCounterSeesNewAndMalloc) {
   EXPECT_EQ(g_allocations - before, 2u);
 }
 
+void expect_no_allocations(uint32_t threads, Held held) {
+  const SyntheticBody body = make_test_body({.uv_size = 32});
+  const SyntheticAvatar avatar = make_test_avatar(body, {.held = held}),
+                        other = make_test_avatar(body, {.sh_degree = 2, .seed = 3, .held = Held::kFixedPoint});
+  const std::unique_ptr<Renderer> renderer = make_renderer(threads);
+  const Result<AvatarId> a = renderer->add_avatar(*avatar.package, *body.package), b = renderer->add_avatar(*other.package, *body.package);
+  ASSERT_TRUE(a.ok() && b.ok());
+  const Scene scene = make_random_scene(5000, 1, 4);
+  const GaussianView view = scene.view();
+  std::vector<SyntheticPose> poses;
+  std::vector<Camera> cameras;
+  for (uint32_t frame = 0; frame < 12; ++frame) {
+    poses.push_back(make_test_pose(body.body(), frame));
+    cameras.push_back(make_test_camera(200, 160, 30.0f * static_cast<float>(frame)));
+    // Closer and closer: the pairs of later frames outgrow those of the first.
+    cameras.back().fx_px *= 1 + 0.1f * static_cast<float>(frame);
+    cameras.back().fy_px *= 1 + 0.1f * static_cast<float>(frame);
+  }
+  std::vector<uint8_t> rgba(200 * 160 * 4);
+  uint64_t after_first = 0, first_pairs = 0, largest_pairs = 0;
+  for (uint32_t frame = 0; frame < 12; ++frame) {
+    const FrameAvatar seen[] = {{.avatar = *a, .pose = poses[frame].view()}, {.avatar = *b, .pose = poses[11 - frame].view()}};
+    ASSERT_TRUE(
+        renderer->render({.camera = cameras[frame], .avatars = seen, .gaussians = {&view, 1}}, {.pixels = rgba.data(), .stride_bytes = 800})
+            .ok());
+    if (frame == 0) after_first = g_allocations;
+    (frame == 0 ? first_pairs : largest_pairs) = std::max(largest_pairs, renderer->statistics().pairs);
+  }
+  EXPECT_EQ(g_allocations - after_first, 0u) << threads << " threads";
+  EXPECT_GT(largest_pairs, first_pairs);
+}
+
 TEST(Allocation, NoFrameAllocatesAfterTheFirst) {
   if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
-  for (const uint32_t threads : {1u, 2u}) {
-    const SyntheticBody body = make_test_body({.uv_size = 32});
-    const SyntheticAvatar avatar = make_test_avatar(body), other = make_test_avatar(body, {.sh_degree = 2, .seed = 3});
-    const std::unique_ptr<Renderer> renderer = make_renderer(threads);
-    const Result<AvatarId> a = renderer->add_avatar(*avatar.package, *body.package),
-                           b = renderer->add_avatar(*other.package, *body.package);
-    ASSERT_TRUE(a.ok() && b.ok());
-    const Scene scene = make_random_scene(5000, 1, 4);
-    const GaussianView view = scene.view();
-    std::vector<SyntheticPose> poses;
-    std::vector<Camera> cameras;
-    for (uint32_t frame = 0; frame < 12; ++frame) {
-      poses.push_back(make_test_pose(body.body(), frame));
-      cameras.push_back(make_test_camera(200, 160, 30.0f * static_cast<float>(frame)));
-      // Closer and closer: the pairs of later frames outgrow those of the first.
-      cameras.back().fx_px *= 1 + 0.1f * static_cast<float>(frame);
-      cameras.back().fy_px *= 1 + 0.1f * static_cast<float>(frame);
-    }
-    std::vector<uint8_t> rgba(200 * 160 * 4);
-    uint64_t after_first = 0, first_pairs = 0, largest_pairs = 0;
-    for (uint32_t frame = 0; frame < 12; ++frame) {
-      const FrameAvatar seen[] = {{.avatar = *a, .pose = poses[frame].view()}, {.avatar = *b, .pose = poses[11 - frame].view()}};
-      ASSERT_TRUE(
-          renderer
-              ->render({.camera = cameras[frame], .avatars = seen, .gaussians = {&view, 1}}, {.pixels = rgba.data(), .stride_bytes = 800})
-              .ok());
-      if (frame == 0) after_first = g_allocations;
-      (frame == 0 ? first_pairs : largest_pairs) = std::max(largest_pairs, renderer->statistics().pairs);
-    }
-    EXPECT_EQ(g_allocations - after_first, 0u) << threads << " threads";
-    EXPECT_GT(largest_pairs, first_pairs);
+  for (const Held held : {Held::kFloat32, Held::kFixedPoint}) {
+    for (const uint32_t threads : {1u, 2u}) expect_no_allocations(threads, held);
   }
 }
 
-TEST(Allocation, MemoryBytesIsWhatWasTaken) {
-  if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
+void expect_memory_is_what_was_taken(Held held) {
   const SyntheticBody body = make_test_body({.uv_size = 128});
-  const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 32, .fourier_octaves = 5});
+  const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 32, .fourier_octaves = 5, .held = held});
   const SyntheticPose pose = make_test_pose(body.body(), 1);
   std::vector<uint8_t> rgba(512 * 512 * 4);
   {
@@ -129,9 +131,15 @@ TEST(Allocation, MemoryBytesIsWhatWasTaken) {
   const FrameAvatar seen[] = {{.avatar = *id, .pose = pose.view()}};
   ASSERT_TRUE(
       renderer->render({.camera = make_test_camera(512, 512), .avatars = seen}, {.pixels = rgba.data(), .stride_bytes = 2048}).ok());
-  const double held = static_cast<double>(g_held_bytes - before), said = static_cast<double>(renderer->memory_bytes());
-  std::printf("edge-sized renderer: says %.2f MB, holds %.2f MB\n", said * 1e-6, held * 1e-6);
-  EXPECT_NEAR(said / held, 1, 0.2);
+  const double taken = static_cast<double>(g_held_bytes - before), said = static_cast<double>(renderer->memory_bytes());
+  std::printf("edge-sized renderer: says %.2f MB, holds %.2f MB\n", said * 1e-6, taken * 1e-6);
+  EXPECT_NEAR(said / taken, 1, 0.2);
+}
+
+TEST(Allocation, MemoryBytesIsWhatWasTaken) {
+  if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
+  expect_memory_is_what_was_taken(Held::kFloat32);
+  expect_memory_is_what_was_taken(Held::kFixedPoint);
 }
 
 }  // namespace

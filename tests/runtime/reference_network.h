@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "figurine/network.h"
@@ -76,8 +77,10 @@ std::vector<Scalar> upsample(const std::vector<Scalar>& input, const ValueShape&
   return output;
 }
 
+// All values, the input first.
 template <class Scalar>
-std::vector<Scalar> run_reference(const Network& network, const std::vector<ValueShape>& shapes, std::vector<Scalar> input) {
+std::vector<std::vector<Scalar>> evaluate_reference(const Network& network, const std::vector<ValueShape>& shapes,
+                                                    std::vector<Scalar> input) {
   std::vector<std::vector<Scalar>> values{std::move(input)};
   for (const Layer& layer : network.layers) {
     const std::vector<Scalar>& a = values[layer.inputs[0]];
@@ -105,7 +108,13 @@ std::vector<Scalar> run_reference(const Network& network, const std::vector<Valu
       }
     }
   }
-  return values.back();
+  return values;
+}
+
+// The last value.
+template <class Scalar>
+std::vector<Scalar> run_reference(const Network& network, const std::vector<ValueShape>& shapes, std::vector<Scalar> input) {
+  return evaluate_reference<Scalar>(network, shapes, std::move(input)).back();
 }
 
 }  // namespace figurine::tests

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "largest_error.h"
@@ -19,6 +21,7 @@ namespace figurine {
 namespace {
 
 using tests::FloatImage;
+using tests::Held;
 using tests::make_renderer;
 using tests::make_test_avatar;
 using tests::make_test_body;
@@ -37,10 +40,21 @@ std::vector<uint8_t> render_bytes(Renderer& renderer, const Frame& frame) {
   return rgba;
 }
 
-AvatarId add(Renderer& renderer, const SyntheticAvatar& avatar, const SyntheticBody& body) {
-  const Result<AvatarId> id = renderer.add_avatar(*avatar.package, *body.package);
+AvatarId add(Renderer& renderer, const SyntheticAvatar& avatar, const SyntheticBody& body, std::optional<Precision> precision = {}) {
+  const Result<AvatarId> id = renderer.add_avatar(*avatar.package, *body.package, precision);
   FIG_CHECK(id.ok(), id.status().message().c_str());
   return *id;
+}
+
+// The network's result by its definition, in the precision that the avatar holds.
+std::vector<double> reference_head(const Avatar& avatar, const std::vector<float>& maps) {
+  if (avatar.holds(Precision::kFloat32)) {
+    return tests::run_reference<double>(avatar.network, *infer_shapes(avatar.network, true), {maps.begin(), maps.end()});
+  }
+  std::vector<int16_t> quantised;
+  for (const float value : maps) quantised.push_back(quantise_input(value, avatar.fixed_point.values[0].scale));
+  const std::vector<float> result = evaluate_fixed_point(avatar.network, avatar.fixed_point, quantised).result;
+  return {result.begin(), result.end()};
 }
 
 // The Gaussians of an avatar by the definitions of figurine/avatar.h and body.h, everything after the shared pose arithmetic in double.
@@ -50,8 +64,7 @@ oracle::Gaussians reference_gaussians(const Avatar& avatar, const Body& body, co
   std::vector<Affine> transforms(body.joint_count());
   draw_pose_maps(body, pose, avatar.map_statistics, transforms, stride, maps);
   draw_fourier_channels(body.uv_size, avatar.fourier_octaves, kMapChannels, stride, maps);
-  const std::vector<double> head =
-      tests::run_reference<double>(avatar.network, *infer_shapes(avatar.network, true), {maps.begin(), maps.end()});
+  const std::vector<double> head = reference_head(avatar, maps);
 
   std::vector<float> joints(body.joint_position_m.size()), texels(body.texel_position_m.size());
   shape_body(body, avatar.template_mode == TemplateMode::kShaped ? avatar.shape : std::span<const float>(), joints, texels);
@@ -94,9 +107,11 @@ oracle::Gaussians reference_gaussians(const Avatar& avatar, const Body& body, co
 }
 
 TEST(Renderer, PosedGaussiansFollowTheDefinitions) {
-  for (const TemplateMode mode : {TemplateMode::kMean, TemplateMode::kShaped}) {
+  const std::pair<TemplateMode, Held> kinds[] = {
+      {TemplateMode::kMean, Held::kFloat32}, {TemplateMode::kShaped, Held::kFloat32}, {TemplateMode::kShaped, Held::kFixedPoint}};
+  for (const auto& [mode, held] : kinds) {
     const SyntheticBody body = make_test_body({.uv_size = 32, .joints = 5});
-    const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 8, .sh_degree = 1, .template_mode = mode});
+    const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 8, .sh_degree = 1, .template_mode = mode, .held = held});
     const std::unique_ptr<Renderer> renderer = make_renderer();
     const AvatarId id = add(*renderer, avatar, body);
     LargestError position("positions, metres"), factor("covariance factors, metres"), opacity("opacities"), sh("SH coefficients");

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "formats/writer/package_writer.h"
+#include "runtime/quantise_network.h"
 
 namespace figurine::tests {
 namespace {
@@ -16,6 +17,17 @@ std::unique_ptr<Package> open(const AlignedBytes& bytes, const char* name) {
   Result<Package> package = Package::open(bytes.bytes(), name);
   FIG_CHECK(package.ok(), package.status().message().c_str());
   return std::make_unique<Package>(std::move(package).value());
+}
+
+// What the network reads in a bent pose: the calibration of networks in fixed point.
+std::vector<float> network_input(const Avatar& avatar, const Body& body) {
+  const uint32_t stride = kMapChannels + 4 * avatar.fourier_octaves;
+  const SyntheticPose pose = make_test_pose(body, 1);
+  std::vector<float> maps(size_t(body.uv_size) * body.uv_size * stride);
+  std::vector<Affine> transforms(body.joint_count());
+  draw_pose_maps(body, pose.view(), avatar.map_statistics, transforms, stride, maps);
+  draw_fourier_channels(body.uv_size, avatar.fourier_octaves, kMapChannels, stride, maps);
+  return maps;
 }
 
 }  // namespace
@@ -145,6 +157,14 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
     layer.weights = storage.back();
     storage.push_back(std::move(bias));
     layer.bias = storage.back();
+  }
+  std::unique_ptr<QuantisedNetwork> quantised;
+  if (options.held != Held::kFloat32) {
+    quantised = std::make_unique<QuantisedNetwork>(avatar.network, network_input(avatar, body.body()));
+    avatar.fixed_point = quantised->fixed;
+  }
+  if (options.held == Held::kFixedPoint) {
+    for (Layer& layer : avatar.network.layers) layer.weights = layer.bias = {};
   }
   const SyntheticPose rest = make_test_pose(body.body(), 0);
   avatar.golden.rotations = rest.rotations;

@@ -49,6 +49,8 @@ struct SyntheticBody {
   const Body& body() const { return package->body(); }
 };
 
+enum class Held { kFloat32, kFixedPoint, kBoth };
+
 struct SyntheticAvatarOptions {
   uint32_t channels = 4;
   uint32_t sh_degree = 0;
@@ -57,6 +59,7 @@ struct SyntheticAvatarOptions {
   std::vector<float> shape = {0.5f, -0.5f};
   std::vector<float> colour = {};  // empty: a random one per avatar; otherwise the head's mean colour
   uint64_t seed = 1;
+  Held held = Held::kFloat32;
 };
 
 struct SyntheticAvatar {

@@ -74,6 +74,10 @@ struct RendererOptions {
   uint64_t (*now_ns)() = nullptr;
 };
 
+// The library that evaluates networks, and its version: "XNNPACK 0.20241108". Frames in fixed point are the same with every version that
+// keeps its arithmetic; where a golden hash differs, this tells whether the library does too.
+const char* network_library();
+
 class Renderer {
  public:
   static Result<std::unique_ptr<Renderer>> create(const RendererOptions& options);
@@ -81,8 +85,10 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  // Packs the network's weights and allocates what a frame of it needs. kMismatch if the avatar was made for another body.
-  Result<AvatarId> add_avatar(const Package& avatar, const Package& body);
+  // Packs the network's weights and allocates what a frame of it needs. precision: fixed point if the avatar has it, otherwise float,
+  // unless said. kMismatch if the avatar was made for another body; kUnsupported if it does not hold the precision.
+  Result<AvatarId> add_avatar(const Package& avatar, const Package& body, std::optional<Precision> precision = std::nullopt);
+  Precision precision(AvatarId avatar) const;  // of an avatar that was added
 
   // Draws one frame. kInvalidArgument on an unsound camera, pose, target or Gaussian count; nothing was drawn then. Gaussians that are not
   // finite are left out, one by one. The same input gives the same pixels for any number of threads.

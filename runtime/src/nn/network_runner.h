@@ -12,8 +12,7 @@
 #include "figurine/network.h"
 #include "runtime/src/memory.h"
 #include "runtime/src/nn/thread_pool.h"
-
-struct xnn_runtime;
+#include "runtime/src/nn/xnnpack_runtime.h"
 
 namespace figurine {
 
@@ -22,7 +21,6 @@ class NetworkRunner {
   // The network's weights are read here and not afterwards. The pool must outlive the runner. Errors: kCorrupt of infer_shapes;
   // kUnsupported where XNNPACK cannot run at all or not this network; kOutOfMemory.
   static Result<std::unique_ptr<NetworkRunner>> create(const Network& network, ThreadPool& pool);
-  ~NetworkRunner();
   NetworkRunner(const NetworkRunner&) = delete;
   NetworkRunner& operator=(const NetworkRunner&) = delete;
 
@@ -38,7 +36,7 @@ class NetworkRunner {
  private:
   NetworkRunner() = default;
 
-  xnn_runtime* runtime_ = nullptr;
+  XnnRuntime runtime_;
   Buffer<float> input_, output_;
   size_t input_count_ = 0, output_count_ = 0;
   ValueShape output_shape_;

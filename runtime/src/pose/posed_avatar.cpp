@@ -5,6 +5,7 @@
 #include <cstring>
 #include <new>
 #include <string>
+#include <vector>
 
 #include "runtime/src/float_math.h"
 
@@ -32,6 +33,14 @@ Status check_network(const Avatar& avatar, const Body& body, const std::vector<V
   return {};
 }
 
+Status check_holds(const Avatar& avatar, Precision precision) {
+  if (avatar.holds(precision)) return {};
+  const std::string held = avatar.holds(Precision::kFixedPoint) ? "q8" : "f32";
+  return Status(StatusCode::kUnsupported, "avatar '" + avatar.name + "': its network is there in " + held + " alone, not in " +
+                                              to_string(precision) + "; `figurine-train pack --precision " + to_string(precision) +
+                                              "` makes a package that has it");
+}
+
 // a b for row-major [3,3] matrices.
 void multiply3(const float* a, const float* b, float* product) {
   for (int i = 0; i < 3; ++i) {
@@ -56,19 +65,16 @@ GaussianView GaussianArrays::view(uint32_t count, uint32_t sh_degree) const {
           .sh = sh.span(3 * n * sh_coefficients(sh_degree))};
 }
 
-Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, const Body& body, ThreadPool& pool) {
-  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, true);
+Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, const Body& body, Precision precision, ThreadPool& pool) {
+  FIG_RETURN_IF_ERROR(check_holds(avatar, precision));
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, false);
   if (!shapes.ok()) return shapes.status();
   FIG_RETURN_IF_ERROR(check_network(avatar, body, *shapes));
 
   std::unique_ptr<PosedAvatar> posed(new (std::nothrow) PosedAvatar(avatar, body, pool));
   if (posed == nullptr) return out_of_memory("an avatar");
-  Result<std::unique_ptr<NetworkRunner>> network = NetworkRunner::create(avatar.network, pool);
-  if (!network.ok()) return network.status();
-  posed->network_ = std::move(network).value();
   posed->input_channels_ = shapes->front().channels;
-  // Constant, so drawn once; the pose maps leave these channels alone.
-  draw_fourier_channels(body.uv_size, avatar.fourier_octaves, kMapChannels, posed->input_channels_, posed->network_->input());
+  FIG_RETURN_IF_ERROR(precision == Precision::kFixedPoint ? posed->create_fixed_point(avatar) : posed->create_float(avatar));
 
   const size_t joints = body.joint_count(), texels = body.texel_count();
   if (!posed->joint_position_m_.ensure(joints * 3) || !posed->texel_position_m_.ensure(texels * 3) || !posed->transforms_.ensure(joints)) {
@@ -79,13 +85,52 @@ Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, c
   return posed;
 }
 
+Status PosedAvatar::create_float(const Avatar& avatar) {
+  Result<std::unique_ptr<NetworkRunner>> network = NetworkRunner::create(avatar.network, pool_);
+  if (!network.ok()) return network.status();
+  float_ = std::move(network).value();
+  // Constant, so drawn once; the pose maps leave these channels alone.
+  draw_fourier_channels(body_.uv_size, avatar.fourier_octaves, kMapChannels, input_channels_, float_->input());
+  return {};
+}
+
+Status PosedAvatar::create_fixed_point(const Avatar& avatar) {
+  const uint32_t fourier_channels = 4 * avatar.fourier_octaves;
+  std::vector<float> fourier(size_t(body_.uv_size) * body_.uv_size * fourier_channels);
+  draw_fourier_channels(body_.uv_size, avatar.fourier_octaves, 0, fourier_channels, fourier);
+  std::vector<uint32_t> drawn(body_.texel.begin(), body_.texel.end());
+  drawn.insert(drawn.end(), body_.border_texel.begin(), body_.border_texel.end());
+  Result<std::unique_ptr<FixedPointRunner>> network =
+      FixedPointRunner::create(avatar.network, avatar.fixed_point,
+                               {.varying_channels = kMapChannels, .constants = fourier, .drawn = drawn, .wanted = body_.texel}, pool_);
+  if (!network.ok()) return network.status();
+  fixed_point_ = std::move(network).value();
+  return {};
+}
+
+void PosedAvatar::draw_maps(const PoseView& pose) {
+  const std::span<Affine> scratch = transforms_.span(body_.joint_count());
+  if (fixed_point_ != nullptr) {
+    draw_pose_maps(body_, pose, statistics_, scratch, fixed_point_->input_stride(), fixed_point_->input());
+  } else {
+    draw_pose_maps(body_, pose, statistics_, scratch, input_channels_, float_->input());
+  }
+}
+
+Status PosedAvatar::run_network() { return fixed_point_ != nullptr ? fixed_point_->run() : float_->run(); }
+
+const float* PosedAvatar::head(size_t i) const {
+  const size_t channels = head_channels(decoding_.sh_degree);
+  if (fixed_point_ != nullptr) return &fixed_point_->output()[i * channels];  // covered texels alone
+  return &std::as_const(*float_).output()[size_t(body_.texel[i]) * channels];
+}
+
 // Head outputs to canonical Gaussians: position = texel + offset, factor = R S.
 void PosedAvatar::decode(uint32_t begin, uint32_t end, GaussianArrays& gaussians) const {
-  const uint32_t channels = head_channels(decoding_.sh_degree), sh_values = 3 * sh_coefficients(decoding_.sh_degree);
-  const std::span<const float> head = std::as_const(*network_).output();
+  const uint32_t sh_values = 3 * sh_coefficients(decoding_.sh_degree);
   const float limit = decoding_.max_log_scale;
   for (size_t i = begin; i < end; ++i) {
-    const float* h = &head[size_t(body_.texel[i]) * channels];
+    const float* h = head(i);
     for (int k = 0; k < 3; ++k) gaussians.position_m[3 * i + k] = texel_position_m_[3 * i + k] + decoding_.offset_scale_m * h[k];
 
     const float quaternion[4] = {1.0f + h[6], h[7], h[8], h[9]};
@@ -119,11 +164,11 @@ void PosedAvatar::skin(uint32_t begin, uint32_t end, GaussianArrays& gaussians) 
 Status PosedAvatar::pose(const PoseView& pose, GaussianArrays& gaussians, StageClock& clock) {
   {
     const StageClock::Scope timed(clock, Stage::kMaps);
-    draw_pose_maps(body_, pose, statistics_, transforms_.span(body_.joint_count()), input_channels_, network_->input());
+    draw_maps(pose);
   }
   {
     const StageClock::Scope timed(clock, Stage::kNetwork);
-    FIG_RETURN_IF_ERROR(network_->run());
+    FIG_RETURN_IF_ERROR(run_network());
   }
   const uint32_t texels = body_.texel_count(), chunks = (texels + kChunk - 1) / kChunk;
   const auto for_each_chunk = [&](const auto& task) {
@@ -144,7 +189,8 @@ Status PosedAvatar::pose(const PoseView& pose, GaussianArrays& gaussians, StageC
 }
 
 uint64_t PosedAvatar::memory_bytes() const {
-  return network_->memory_bytes() + joint_position_m_.memory_bytes() + texel_position_m_.memory_bytes() + transforms_.memory_bytes();
+  const uint64_t network = fixed_point_ != nullptr ? fixed_point_->memory_bytes() : float_->memory_bytes();
+  return network + joint_position_m_.memory_bytes() + texel_position_m_.memory_bytes() + transforms_.memory_bytes();
 }
 
 }  // namespace figurine

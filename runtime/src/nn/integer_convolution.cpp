@@ -1,0 +1,121 @@
+#include "runtime/src/nn/integer_convolution.h"
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+namespace figurine {
+namespace {
+
+constexpr size_t kOutputsAtOnce = 4;  // sums of one pass over a patch: enough to hide its loads, few enough for 16 registers
+constexpr size_t kVector = 8;         // int16 values that lengths are multiples of
+
+// The scalar specification is what stands here; four sums at once let the compiler load each part of the patch once.
+void multiply_four(const int16_t* __restrict patch, const int16_t* __restrict weights, size_t length, int32_t* __restrict sums) {
+  patch = std::assume_aligned<16>(patch);
+  weights = std::assume_aligned<16>(weights);
+  const int16_t *w0 = weights, *w1 = weights + length, *w2 = w1 + length, *w3 = w2 + length;
+  int32_t s0 = 0, s1 = 0, s2 = 0, s3 = 0;
+  for (size_t k = 0; k < length; ++k) {
+    s0 += int32_t{patch[k]} * w0[k];
+    s1 += int32_t{patch[k]} * w1[k];
+    s2 += int32_t{patch[k]} * w2[k];
+    s3 += int32_t{patch[k]} * w3[k];
+  }
+  sums[0] += s0;
+  sums[1] += s1;
+  sums[2] += s2;
+  sums[3] += s3;
+}
+
+}  // namespace
+
+bool PaddedMap::ensure(uint32_t size, uint32_t channels) {
+  size_ = size;
+  stride_ = stride_of(channels);
+  return values_.ensure(size_t(size + 2) * (size + 2) * stride_);
+}
+
+bool IntegerConvolution::prepare(const Layer& layer, const FixedPointConvolution& convolution, const ValueShape& input, uint32_t varying,
+                                 std::span<const int16_t> constants) {
+  size_ = input.size;
+  kernel_ = layer.kernel;
+  varying_ = varying;
+  outputs_ = layer.out_channels;
+  stride_ = PaddedMap::stride_of(varying);
+  const size_t taps = size_t{kernel_} * kernel_;
+  length_ = taps * stride_;
+  padded_outputs_ = (outputs_ + kOutputsAtOnce - 1) / kOutputsAtOnce * kOutputsAtOnce;
+  if (!weights_.ensure(padded_outputs_ * length_)) return false;
+  for (size_t row = 0; row < outputs_ * taps; ++row) {
+    std::copy_n(convolution.weights.data() + row * input.channels, varying, weights_.data() + row * stride_);
+  }
+  one_bias_ = varying == input.channels;
+  if (!one_bias_) return fold(layer, convolution, input.channels, constants);
+  if (!bias_.ensure(padded_outputs_)) return false;
+  std::copy(convolution.bias.begin(), convolution.bias.end(), bias_.data());
+  return true;
+}
+
+bool IntegerConvolution::fold(const Layer& layer, const FixedPointConvolution& convolution, uint32_t in_channels,
+                              std::span<const int16_t> constants) {
+  const uint32_t count = in_channels - varying_;
+  const size_t texels = size_t{size_} * size_, taps = size_t{kernel_} * kernel_;
+  if (!bias_.ensure(texels * padded_outputs_)) return false;
+
+  // The same convolution over the constant channels alone, as if they varied.
+  IntegerConvolution rest;
+  PaddedMap map;
+  std::vector<int8_t> weights(outputs_ * taps * count);
+  for (size_t row = 0; row < outputs_ * taps; ++row) {
+    std::copy_n(convolution.weights.data() + row * in_channels + varying_, count, weights.data() + row * count);
+  }
+  const FixedPointConvolution of_constants{.weights = weights, .weight_scale = convolution.weight_scale, .bias = convolution.bias};
+  if (!map.ensure(size_, count) || !rest.prepare(layer, of_constants, {size_, count}, count, {})) return false;
+  for (uint32_t y = 0; y < size_; ++y) {
+    for (uint32_t x = 0; x < size_; ++x) {
+      std::copy_n(constants.data() + (size_t{y} * size_ + x) * count, count, map.row(static_cast<int32_t>(y)) + x * map.stride());
+    }
+  }
+  Buffer<int16_t> patch;
+  if (!patch.ensure(rest.patch_length())) return false;
+  for (uint32_t y = 0; y < size_; ++y) {
+    for (uint32_t x = 0; x < size_; ++x) {
+      rest.gather(map, x, y, patch.data());
+      rest.sum(patch.data(), x, y, &bias_[(size_t{y} * size_ + x) * padded_outputs_]);
+    }
+  }
+  return true;
+}
+
+void IntegerConvolution::gather(const PaddedMap& map, uint32_t x, uint32_t y, int16_t* patch) const {
+  const int32_t reach = static_cast<int32_t>(kernel_ / 2);
+  const size_t row_length = kernel_ * stride_;
+  for (int32_t ky = -reach; ky <= reach; ++ky) {
+    const int16_t* from = map.row(static_cast<int32_t>(y) + ky) + (ptrdiff_t{x} - reach) * static_cast<ptrdiff_t>(stride_);
+    for (size_t k = 0; k < row_length; k += kVector) std::copy_n(from + k, kVector, patch + k);
+    patch += row_length;
+  }
+}
+
+void IntegerConvolution::gather(const int8_t* map, int32_t zero_point, uint32_t x, uint32_t y, int16_t* patch) const {
+  const int32_t reach = static_cast<int32_t>(kernel_ / 2), size = static_cast<int32_t>(size_);
+  for (int32_t row = static_cast<int32_t>(y) - reach; row <= static_cast<int32_t>(y) + reach; ++row) {
+    for (int32_t column = static_cast<int32_t>(x) - reach; column <= static_cast<int32_t>(x) + reach; ++column, patch += stride_) {
+      if (row < 0 || row >= size || column < 0 || column >= size) {
+        std::fill_n(patch, varying_, int16_t{0});
+        continue;
+      }
+      const int8_t* from = map + (size_t(row) * size_ + size_t(column)) * varying_;
+      for (uint32_t c = 0; c < varying_; ++c) patch[c] = static_cast<int16_t>(from[c] - zero_point);
+    }
+  }
+}
+
+void IntegerConvolution::sum(const int16_t* patch, uint32_t x, uint32_t y, int32_t* sums) const {
+  const int32_t* bias = bias_.data() + (one_bias_ ? 0 : (size_t{y} * size_ + x) * padded_outputs_);
+  std::copy_n(bias, padded_outputs_, sums);
+  for (size_t o = 0; o < padded_outputs_; o += kOutputsAtOnce) multiply_four(patch, weights_.data() + o * length_, length_, sums + o);
+}
+
+}  // namespace figurine
