@@ -4,6 +4,8 @@
 #include <string>
 
 #include "toolchain/error.h"
+#include "toolchain/model/fake_quantisation.h"
+#include "toolchain/model/unet_plan.h"
 
 namespace figurine::model {
 
@@ -31,34 +33,77 @@ class Random {
 
 }  // namespace
 
-// Where a convolution's parameters lie in the flat tensor: kernel [out,k,k,in], then bias [out].
-struct ConvolutionSlot {
-  int64_t weights = 0, bias = 0;
-  int64_t in = 0, out = 0, kernel = 0;
-  int64_t end() const { return bias + out; }
-};
+torch::Tensor batched(const torch::Tensor& t, const ConvolutionSlot& slot) {
+  constexpr int64_t kBatch = 16;
+  const int64_t channels = t.size(1), height = t.size(2), width = t.size(3);
+  if (slot.kernel != 1 || height % kBatch != 0) return t;
+  return t.permute({0, 2, 3, 1}).reshape({kBatch, height / kBatch, width, channels}).permute({0, 3, 1, 2});
+}
 
-// The network's shape; shared with the graph's nodes.
-struct UNetPlan : torch::CustomClassHolder {
-  Network network;  // without weights
-  std::vector<ValueShape> shapes;
-  std::vector<ConvolutionSlot> slots;  // [layers]; meaningful for convolutions
-  int64_t parameters = 0;
-  Precision precision = Precision::kBfloat16;
+torch::Tensor unbatched(const torch::Tensor& t, const torch::Tensor& like) {
+  if (t.size(0) == 1) return t;
+  return t.permute({0, 2, 3, 1}).reshape({1, like.size(2), like.size(3), t.size(1)}).permute({0, 3, 1, 2});
+}
 
-  bool is_head(size_t layer) const { return layer + 1 == network.layers.size(); }
-  // The head stays in float, whatever the other convolutions do.
-  torch::ScalarType type_of(size_t layer) const {
-    return precision == Precision::kBfloat16 && !is_head(layer) ? torch::kBFloat16 : torch::kFloat;
+void give_back(const Layer& layer, const torch::Tensor& gradient, const torch::Tensor& a, const torch::Tensor& pooled,
+               ValueGradients& gradients) {
+  switch (layer.op) {
+    case LayerOp::kConv2d:
+      break;  // the caller's
+    case LayerOp::kMaxPool2:
+      gradients.give(layer.inputs[0], at::max_pool2d_with_indices_backward(gradient, a, {2, 2}, {2, 2}, {0, 0}, {1, 1}, false, pooled));
+      break;
+    case LayerOp::kUpsample2:
+      gradients.give(layer.inputs[0], at::upsample_bilinear2d_backward(gradient, {2 * a.size(2), 2 * a.size(3)}, a.sizes(), false));
+      break;
+    case LayerOp::kConcat: {
+      const int64_t first = a.size(1);
+      gradients.give(layer.inputs[0], gradient.narrow(1, 0, first).contiguous(kChannelsLast));
+      gradients.give(layer.inputs[1], gradient.narrow(1, first, gradient.size(1) - first).contiguous(kChannelsLast));
+      break;
+    }
   }
-  // A view of flat as [out,in,k,k] in channels-last strides: no copy.
-  static torch::Tensor kernel_of(const torch::Tensor& flat, const ConvolutionSlot& slot) {
-    return flat.narrow(0, slot.weights, slot.bias - slot.weights).view({slot.out, slot.kernel, slot.kernel, slot.in}).permute({0, 3, 1, 2});
-  }
-  static torch::Tensor bias_of(const torch::Tensor& flat, const ConvolutionSlot& slot) { return flat.narrow(0, slot.bias, slot.out); }
-};
+}
 
 namespace {
+
+// Every value of one evaluation [layers + 1], and what the layers' backward passes need beside: cast kernels, indices of pools.
+struct Evaluation {
+  std::vector<torch::Tensor> values, extra;
+};
+
+Evaluation evaluate_layers(const torch::Tensor& flat, const torch::Tensor& input, const UNetPlan& plan) {
+  const std::vector<Layer>& layers = plan.network.layers;
+  Evaluation evaluation{std::vector<torch::Tensor>(layers.size() + 1), std::vector<torch::Tensor>(layers.size())};
+  auto& [values, extra] = evaluation;
+  values[0] = as_channels_last(input).to(plan.type_of(0));
+  for (size_t i = 0; i < layers.size(); ++i) {
+    const torch::Tensor& a = values[layers[i].inputs[0]];
+    torch::Tensor& out = values[i + 1];
+    switch (layers[i].op) {
+      case LayerOp::kConv2d: {
+        const torch::ScalarType type = plan.type_of(i);
+        const ConvolutionSlot& slot = plan.slots[i];
+        extra[i] = UNetPlan::kernel_of(flat, slot).to(type);
+        out = unbatched(at::convolution(batched(a.to(type), slot), extra[i], UNetPlan::bias_of(flat, slot).to(type), {1, 1}, slot.padding(),
+                                        {1, 1}, false, {0, 0}, 1),
+                        a);
+        if (layers[i].relu) out.relu_();
+        break;
+      }
+      case LayerOp::kMaxPool2:
+        std::tie(out, extra[i]) = at::max_pool2d_with_indices(a, {2, 2}, {2, 2});
+        break;
+      case LayerOp::kUpsample2:
+        out = at::upsample_bilinear2d(a, {2 * a.size(2), 2 * a.size(3)}, false);
+        break;
+      case LayerOp::kConcat:
+        out = at::cat({a, values[layers[i].inputs[1]]}, 1);
+        break;
+    }
+  }
+  return evaluation;
+}
 
 // The whole network as one node of the graph: forward keeps every value, backward walks the layers in reverse. Saves the per-operation cost
 // of autograd and of autocast's casts, and writes all weight gradients into one flat tensor.
@@ -66,35 +111,8 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
  public:
   static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::Tensor& flat, const torch::Tensor& input,
                                const c10::intrusive_ptr<UNetPlan>& plan) {
-    const std::vector<Layer>& layers = plan->network.layers;
-    std::vector<torch::Tensor> values(layers.size() + 1), extra(layers.size());
-    values[0] = as_channels_last(input).to(plan->type_of(0));
-    for (size_t i = 0; i < layers.size(); ++i) {
-      const torch::Tensor& a = values[layers[i].inputs[0]];
-      torch::Tensor& out = values[i + 1];
-      switch (layers[i].op) {
-        case LayerOp::kConv2d: {
-          const torch::ScalarType type = plan->type_of(i);
-          const ConvolutionSlot& slot = plan->slots[i];
-          extra[i] = UNetPlan::kernel_of(flat, slot).to(type);
-          out = unbatched(at::convolution(batched(a.to(type), slot), extra[i], UNetPlan::bias_of(flat, slot).to(type), {1, 1},
-                                          padding(slot), {1, 1}, false, {0, 0}, 1),
-                          a);
-          if (layers[i].relu) out.relu_();
-          break;
-        }
-        case LayerOp::kMaxPool2:
-          std::tie(out, extra[i]) = at::max_pool2d_with_indices(a, {2, 2}, {2, 2});
-          break;
-        case LayerOp::kUpsample2:
-          out = at::upsample_bilinear2d(a, {2 * a.size(2), 2 * a.size(3)}, false);
-          break;
-        case LayerOp::kConcat:
-          out = at::cat({a, values[layers[i].inputs[1]]}, 1);
-          break;
-      }
-    }
-    torch::Tensor head = values.back().permute({0, 2, 3, 1}).squeeze(0).contiguous();
+    auto [values, extra] = evaluate_layers(flat, input, *plan);
+    torch::Tensor head = as_rows(values.back());
     values.back() = torch::Tensor();  // the backward pass does not need it
     context->saved_data["plan"] = c10::IValue::make_capsule(plan);
     context->saved_data["values"] = std::move(values);
@@ -108,71 +126,33 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
                                      extra = context->saved_data["extra"].toTensorVector();
     const std::vector<Layer>& layers = plan->network.layers;
     torch::Tensor flat = torch::empty({plan->parameters});
-    std::vector<torch::Tensor> gradients(layers.size() + 1);
-    gradients.back() = as_channels_last(output_gradients[0].contiguous());
-    // A value that several layers read gets the sum of their gradients; the layers run in reverse, so it is complete when its own layer
-    // comes.
-    const auto give = [&](uint32_t value, torch::Tensor gradient) {
-      gradients[value] = gradients[value].defined() ? gradients[value].add_(gradient) : std::move(gradient);
-    };
+    ValueGradients gradients(layers.size() + 1);
+    gradients.give(static_cast<uint32_t>(layers.size()), as_channels_last(output_gradients[0].contiguous()));
     for (size_t i = layers.size(); i-- > 0;) {
       const Layer& layer = layers[i];
-      torch::Tensor gradient = std::move(gradients[i + 1]);
+      torch::Tensor gradient = gradients.take(i + 1);
       const torch::Tensor& a = values[layer.inputs[0]];
       if (!gradient.defined()) {  // nothing reads this value
         if (layer.op == LayerOp::kConv2d) flat.narrow(0, plan->slots[i].weights, plan->slots[i].end() - plan->slots[i].weights).zero_();
         continue;
       }
-      switch (layer.op) {
-        case LayerOp::kConv2d: {
-          const torch::ScalarType type = plan->type_of(i);
-          const ConvolutionSlot& slot = plan->slots[i];
-          if (layer.relu) gradient = at::threshold_backward(gradient, values[i + 1], 0);
-          const bool to_input = layer.inputs[0] != 0;
-          const int64_t bias_size = slot.out;
-          auto [d_input, d_kernel, d_bias] =
-              at::convolution_backward(batched(gradient.to(type), slot), batched(a.to(type), slot), extra[i], at::IntArrayRef(bias_size),
-                                       {1, 1}, padding(slot), {1, 1}, false, {0, 0}, 1, {to_input, true, true});
-          UNetPlan::kernel_of(flat, slot).copy_(d_kernel);
-          UNetPlan::bias_of(flat, slot).copy_(d_bias);
-          if (to_input) give(layer.inputs[0], unbatched(d_input, a).to(a.scalar_type()));
-          break;
-        }
-        case LayerOp::kMaxPool2:
-          give(layer.inputs[0], at::max_pool2d_with_indices_backward(gradient, a, {2, 2}, {2, 2}, {0, 0}, {1, 1}, false, extra[i]));
-          break;
-        case LayerOp::kUpsample2:
-          give(layer.inputs[0], at::upsample_bilinear2d_backward(gradient, {2 * a.size(2), 2 * a.size(3)}, a.sizes(), false));
-          break;
-        case LayerOp::kConcat: {
-          const int64_t first = a.size(1);
-          give(layer.inputs[0], gradient.narrow(1, 0, first).contiguous(kChannelsLast));
-          give(layer.inputs[1], gradient.narrow(1, first, gradient.size(1) - first).contiguous(kChannelsLast));
-          break;
-        }
+      if (layer.op != LayerOp::kConv2d) {
+        give_back(layer, gradient, a, extra[i], gradients);
+        continue;
       }
+      const torch::ScalarType type = plan->type_of(i);
+      const ConvolutionSlot& slot = plan->slots[i];
+      if (layer.relu) gradient = at::threshold_backward(gradient, values[i + 1], 0);
+      const bool to_input = layer.inputs[0] != 0;
+      auto [d_input, d_kernel, d_bias] =
+          at::convolution_backward(batched(gradient.to(type), slot), batched(a.to(type), slot), extra[i], at::IntArrayRef(slot.out), {1, 1},
+                                   slot.padding(), {1, 1}, false, {0, 0}, 1, {to_input, true, true});
+      UNetPlan::kernel_of(flat, slot).copy_(d_kernel);
+      UNetPlan::bias_of(flat, slot).copy_(d_bias);
+      if (to_input) gradients.give(layer.inputs[0], unbatched(d_input, a).to(a.scalar_type()));
     }
     return {flat, {}, {}};
   }
-
- private:
-  // [T,T,C] seen as [1,C,T,T] in channels-last strides. By view and permute: unsqueeze would give the batch a stride that is not recognised
-  // as channels-last, and the convolutions would take their slow path.
-  static torch::Tensor as_channels_last(const torch::Tensor& t) {
-    return t.view({1, t.size(0), t.size(1), t.size(2)}).permute({0, 3, 1, 2});
-  }
-  // A 1x1 convolution sees its pixels as a batch of 16: for batch 1 on one thread LibTorch would leave oneDNN for a BLAS call.
-  static torch::Tensor batched(const torch::Tensor& t, const ConvolutionSlot& slot) {
-    constexpr int64_t kBatch = 16;
-    const int64_t channels = t.size(1), height = t.size(2), width = t.size(3);
-    if (slot.kernel != 1 || height % kBatch != 0) return t;
-    return t.permute({0, 2, 3, 1}).reshape({kBatch, height / kBatch, width, channels}).permute({0, 3, 1, 2});
-  }
-  static torch::Tensor unbatched(const torch::Tensor& t, const torch::Tensor& like) {
-    if (t.size(0) == 1) return t;
-    return t.permute({0, 2, 3, 1}).reshape({1, like.size(2), like.size(3), t.size(1)}).permute({0, 3, 1, 2});
-  }
-  static std::vector<int64_t> padding(const ConvolutionSlot& slot) { return {slot.kernel / 2, slot.kernel / 2}; }
 };
 
 }  // namespace
@@ -180,6 +160,7 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
 struct PoseUNet::Impl {
   c10::intrusive_ptr<UNetPlan> plan = c10::make_intrusive<UNetPlan>();
   torch::Tensor weights;
+  std::shared_ptr<const FakeQuantisation> fake_quantisation;  // null: plain
 };
 
 PoseUNet::PoseUNet(const Network& network, const PoseUNetOptions& options) : impl_(std::make_unique<Impl>()) {
@@ -221,12 +202,32 @@ PoseUNet::PoseUNet(const Network& network, const PoseUNetOptions& options) : imp
 
 PoseUNet::~PoseUNet() = default;
 
-torch::Tensor PoseUNet::forward(const torch::Tensor& input) {
+void PoseUNet::check_input(const torch::Tensor& input) const {
   const UNetPlan& plan = *impl_->plan;
   const int64_t size = plan.network.input_size, channels = plan.network.input_channels;
   TORCH_CHECK(input.scalar_type() == torch::kFloat && input.is_contiguous() && input.sizes() == torch::IntArrayRef({size, size, channels}),
               "PoseUNet: the input must be contiguous floats [", size, ",", size, ",", channels, "]");
+}
+
+torch::Tensor PoseUNet::forward(const torch::Tensor& input) {
+  check_input(input);
+  if (impl_->fake_quantisation != nullptr) return run_fake_quantised(impl_->weights, input, impl_->plan, impl_->fake_quantisation);
   return RunUNet::apply(impl_->weights, input, impl_->plan);
+}
+
+std::vector<torch::Tensor> PoseUNet::evaluate_values(const torch::Tensor& input) const {
+  check_input(input);
+  torch::NoGradGuard no_gradient;
+  if (impl_->fake_quantisation != nullptr) return fake_quantised_values(impl_->weights, input, *impl_->plan, *impl_->fake_quantisation);
+  return evaluate_layers(impl_->weights, input, *impl_->plan).values;
+}
+
+void PoseUNet::set_fake_quantisation(std::shared_ptr<const FakeQuantisation> quantisation) {
+  if (quantisation != nullptr) {
+    TORCH_CHECK(impl_->plan->precision == Precision::kFloat32, "fake quantisation needs float: bf16 holds no multiple of a scale");
+    check_fake_quantisation(*quantisation, *impl_->plan);
+  }
+  impl_->fake_quantisation = std::move(quantisation);
 }
 
 torch::Tensor& PoseUNet::weights() { return impl_->weights; }

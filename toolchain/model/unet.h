@@ -15,6 +15,8 @@
 
 namespace figurine::model {
 
+struct FakeQuantisation;  // fake_quantisation.h
+
 enum class Precision : uint8_t { kFloat32, kBfloat16 };
 
 struct PoseUNetOptions {
@@ -34,6 +36,13 @@ class PoseUNet {
   // input).
   torch::Tensor forward(const torch::Tensor& input);
 
+  // Every value of one evaluation, value 0 first: [1,C,H,W] in channels-last strides, without gradient. In integer units (q - zero point)
+  // with fake quantisation, but for the last, which is real.
+  std::vector<torch::Tensor> evaluate_values(const torch::Tensor& input) const;
+
+  // From now on forward() and evaluate_values() imitate fixed point; null: plain again. Needs Precision::kFloat32. Never changes weights.
+  void set_fake_quantisation(std::shared_ptr<const FakeQuantisation> quantisation);
+
   torch::Tensor& weights();    // [P] flat float; a leaf that requires a gradient
   torch::Tensor& gradients();  // [P] flat float; backward passes add to it, undefined before the first
   void zero_gradients();
@@ -47,6 +56,8 @@ class PoseUNet {
   void import_network(const Network& network);
 
  private:
+  void check_input(const torch::Tensor& input) const;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
