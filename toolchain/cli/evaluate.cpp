@@ -1,8 +1,10 @@
-// figurine-train evaluate: how good a trained avatar is (reconstruction), and whether the device draws the same (parity).
+// figurine-train evaluate: how good a trained avatar is (reconstruction), what fixed point costs it (quantization), and whether the device
+// draws the same (parity).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -12,6 +14,7 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/contact_sheet.h"
+#include "toolchain/evaluate/quantization.h"
 #include "toolchain/evaluate/reconstruction.h"
 #include "toolchain/verify/parity.h"
 
@@ -23,6 +26,10 @@ struct EvaluateArguments {
   train::OpenRunOptions open;
   evaluate::ReconstructionOptions reconstruction;
   verify::ParityOptions parity;
+  evaluate::QuantizationOptions quantization;
+  quantize::FineTuneOptions fine_tune;
+  bool no_qat = false;
+  std::vector<std::string> runs, packages;  // of quantization
   std::string sheet, output, package;
 };
 
@@ -89,6 +96,41 @@ void run_parity(const EvaluateArguments& arguments) {
               parity.views.size(), parity.worst_psnr_db, parity.largest_error);
 }
 
+void print_row(const nlohmann::json& row) {
+  const auto number = [&](const char* key) { return row.contains(key) && row.at(key).is_number() ? row.at(key).get<double>() : NAN; };
+  std::printf("%-24s drop %6.3f dB  to f32 %6.2f  slow motion %6.2f  trembling %6.2f dB\n", row.at("name").get<std::string>().c_str(),
+              number("psnr_drop_db"), number("psnr_to_f32_db"), number("slow_motion_db"), number("trembling_pose_db"));
+}
+
+void run_quantization(const EvaluateArguments& arguments) {
+  if (!arguments.packages.empty() && arguments.packages.size() != arguments.runs.size()) {
+    throw InputError("--package: one for every --run, in the same order");
+  }
+  evaluate::QuantizationOptions options = arguments.quantization;
+  if (!arguments.no_qat) {
+    options.fine_tune = arguments.fine_tune;
+    options.fine_tune->calibration = options.calibration;
+    options.fine_tune->threads = arguments.open.threads;
+    options.fine_tune->quiet = options.quiet;
+  }
+  std::vector<nlohmann::json> reports;
+  for (size_t i = 0; i < arguments.runs.size(); ++i) {
+    train::OpenRunOptions open = arguments.open;
+    open.run = arguments.runs[i];
+    train::TrainedAvatar avatar = train::TrainedAvatar::open(open);
+    reports.push_back(evaluate::evaluate_quantization(avatar, {open.run}, options));
+    if (!arguments.packages.empty()) reports.back()["package_bytes"] = std::filesystem::file_size(arguments.packages[i]);
+  }
+  nlohmann::json report = evaluate::summarise_quantization(reports);
+  if (!arguments.packages.empty()) report["package_bytes"] = reports.front().at("package_bytes");
+  report["command"] = train::current_command();
+  report["commit"] = train::current_commit();
+  report["machine"] = train::describe_machine();
+  report["date"] = train::utc_now();
+  if (!arguments.output.empty()) train::write_json(arguments.output, report);
+  for (const nlohmann::json& row : report.at("rows")) print_row(row);
+}
+
 void add_run_options(CLI::App* command, const std::shared_ptr<EvaluateArguments>& arguments) {
   command->add_option("--run", arguments->open.run, "Folder of a run")->required();
   command->add_option("--data", arguments->open.data, "Where the data is now (default: where the run found it)");
@@ -112,6 +154,21 @@ void add_evaluate_command(CLI::App& app) {
       ->add_option("--view-frame-step", arguments->reconstruction.view_frame_step, "Look at every n-th training pose only (default 1: all)")
       ->check(CLI::PositiveNumber);
   reconstruction->callback([arguments] { run_reconstruction(*arguments); });
+
+  CLI::App* quantization = command->add_subcommand("quantization", "Fixed point against float and against the truth, layer by layer");
+  quantization->add_option("--run", arguments->runs, "Folder of a run; may be given several times")->required();
+  quantization->add_option("--package", arguments->packages, "Its package, for the size; one for every run");
+  quantization->add_option("--motion", arguments->quantization.motion,
+                           "Package whose beginning is slowed down (default: the capture's frames)");
+  quantization->add_flag("--no-qat", arguments->no_qat, "Leave the fine-tuned rows out");
+  quantization->add_option("--qat-iterations", arguments->fine_tune.iterations, "Of the fine-tune in RUN/qat (default 400)")
+      ->check(CLI::PositiveNumber);
+  quantization->add_option("--views-per-pose", arguments->quantization.views_per_pose, "Cameras of a held-out pose (default 4)")
+      ->check(CLI::PositiveNumber);
+  quantization->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
+  quantization->add_flag("--quiet", arguments->quantization.quiet, "No progress");
+  quantization->add_option("-o,--output", arguments->output, "Report to write, JSON");
+  quantization->callback([arguments] { run_quantization(*arguments); });
 
   CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, in float");
   add_run_options(parity, arguments);

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "ports/linux/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
+#include "toolchain/quantize/fine_tune.h"
+#include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/verify/parity.h"
 
@@ -19,6 +22,8 @@ struct PackArguments {
   train::OpenRunOptions open;
   train::PackOptions pack;
   std::string precision = "f32", output;
+  bool fine_tune = false;
+  quantize::FineTuneOptions fine_tuning;
 };
 
 // Package bytes must be aligned as a memory map is.
@@ -39,10 +44,37 @@ class AlignedCopy {
   size_t size_ = 0;
 };
 
-void run(const PackArguments& arguments) {
-  if (arguments.precision != "f32")
-    throw InputError("--precision " + arguments.precision + ": unsupported by this build; packages are f32");
+// The run's network in fixed point: fine-tuned for it, or its weights as they are. Says in `settings` how it was made.
+quantize::QuantisedNetwork quantise(const PackArguments& arguments, train::TrainedAvatar& avatar, std::vector<KeyValue>& settings) {
+  const quantize::FineTuneOptions& fine_tuning = arguments.fine_tuning;
+  model::PoseUNet& unet = avatar.model().unet();
+  std::vector<float> storage, tuned_storage;
+  const Network network = unet.export_network(storage);
+  settings.push_back({"fixed_point.calibration", quantize::describe(fine_tuning.calibration)});
+  settings.push_back({"fixed_point.calibration_poses", std::to_string(fine_tuning.calibration.poses)});
+  settings.push_back({"fixed_point.qat_iterations", std::to_string(arguments.fine_tune ? fine_tuning.iterations : 0)});
+  if (!arguments.fine_tune) {
+    const quantize::ActivationStatistics statistics = quantize::observe_activations(avatar, fine_tuning.calibration.poses);
+    return {network, quantize::choose_scales(network, statistics, fine_tuning.calibration)};
+  }
+  const quantize::FineTuned tuned = quantize::fine_tune(avatar, {arguments.open.run}, fine_tuning);
+  train::load_weights(tuned.weights, unet);
+  const quantize::QuantisedNetwork quantised(unet.export_network(tuned_storage), tuned.scales);
+  unet.import_network(network);
+  return quantised;
+}
+
+void run(PackArguments arguments) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
+  std::optional<quantize::QuantisedNetwork> quantised;
+  if (arguments.precision != "f32") {
+    arguments.fine_tuning.threads = arguments.open.threads;
+    quantised = quantise(arguments, avatar, arguments.pack.settings);
+    arguments.pack.fixed_point = quantised->view();
+    arguments.pack.float_weights = arguments.precision != "q8";
+  } else if (arguments.fine_tune) {
+    throw InputError("--qat: is for --precision q8");
+  }
   const train::RunDirectory folder{arguments.open.run};
   // Written twice: the first copy runs on the device's renderer, which then says how much memory it held.
   train::PackOptions options = arguments.pack;
@@ -66,7 +98,10 @@ void add_pack_command(CLI::App& app) {
   command->add_option("-o,--output", arguments->output, "Package to write")->required();
   command->add_option("--data", arguments->open.data, "Where the data is now (default: where the run found it)");
   command->add_option("--body", arguments->open.body, "Where the body is now (default: where the run found it)");
-  command->add_option("--precision", arguments->precision, "f32")->check(CLI::IsMember({"f32", "q8"}));
+  command->add_option("--precision", arguments->precision, "Float weights, fixed point or both (default f32)")
+      ->check(CLI::IsMember({"f32", "q8", "f32,q8"}));
+  command->add_flag("--qat", arguments->fine_tune, "Fine-tune for fixed point first, in RUN/qat; the run's own weights stay");
+  command->add_option("--qat-iterations", arguments->fine_tuning.iterations, "Of the fine-tune (default 400)")->check(CLI::PositiveNumber);
   command->add_flag("--golden,!--no-golden", arguments->pack.golden, "Carry an expected picture (default)");
   command->add_option("--name", arguments->pack.name, "Name of the avatar (default: the identity's folder)");
   command->add_option("--licence", arguments->pack.licence_name, "Licence (synthetic persons: CC0-1.0)");

@@ -89,6 +89,7 @@ Provenance make_provenance(const TrainedAvatar& avatar, const RunDirectory& run,
   }
   if (json.contains("data") && json.at("data").contains("seed"))
     provenance.settings.push_back({"data.seed", json.at("data").at("seed").dump()});
+  provenance.settings.insert(provenance.settings.end(), options.settings.begin(), options.settings.end());
   provenance.quality = read_quality(run);
   return provenance;
 }
@@ -155,8 +156,11 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   const TrainSettings& settings = avatar.description().settings;
   if (settings.freeze_pose) throw InputError(run.path + ": was trained with a frozen body pose, an experiment that no device can repeat");
   std::vector<float> storage;
-  const Network network = avatar.model().unet().export_network(storage);
+  Network network = avatar.model().unet().export_network(storage);
   const std::vector<ValueShape> shapes = value_or_throw(infer_shapes(network, true), run.path);
+  if (!options.float_weights) {
+    for (Layer& layer : network.layers) layer.weights = layer.bias = {};
+  }
 
   std::vector<std::vector<float>> rotations;
   for (const dataset::CaptureFrame& frame : avatar.data().frames()) {
@@ -176,12 +180,14 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
                  .fourier_octaves = settings.fourier_octaves,
                  .decoding = settings.decoding,
                  .network = network,
+                 .fixed_point = options.fixed_point,
                  .pose_statistics = {features.joints, features.mean, features.covariance},
                  .golden = {.root_translation_m = view.pose.root_translation_m,
                             .rotations = view.pose.rotations,
                             .camera = view.camera,
                             .background = kGoldenBackground,
-                            .png = {reinterpret_cast<const uint8_t*>(png.data()), png.size()}}};
+                            .png = {reinterpret_cast<const uint8_t*>(png.data()), png.size()},
+                            .fixed_point_hash = options.fixed_point_hash}};
   const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
                                 .macs_per_frame = count_macs(network, shapes),
                                 .gaussians = avatar.body().texel_count()};

@@ -67,6 +67,7 @@ class Trainer {
         model_(body.package.body(), data.shape(), settings, settings.bf16),
         optimiser_(model_.unet().parameter_count(),
                    {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {
+    model_.unet().set_fake_quantisation(request.fake_quantisation);
   }
 
   TrainResult run() {
@@ -309,6 +310,7 @@ TrainResult train_avatar(const TrainRequest& request) {
   const dataset::Dataset data = dataset::Dataset::open(request.data, {.body = &body.package.body(), .body_hash = body_hash});
   if (!exists) {
     description = describe(request, settings, body, data);
+    description.update(request.notes);
     std::error_code error;
     std::filesystem::create_directories(request.run, error);
     if (error) throw InputError(request.run + ": cannot be created: " + error.message());

@@ -9,10 +9,16 @@
 // Human Rendering, 2024 (the warm-up).
 #pragma once
 
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/settings.h"
+
+namespace figurine::model {
+struct FakeQuantisation;
+}
 
 namespace figurine::train {
 
@@ -25,7 +31,9 @@ struct TrainRequest {
   bool resume = false;  // goes on from the run's checkpoint, by the run's own settings; only settings.threads counts
   bool quiet = false;
   double checkpoint_period_s = 30;
-  uint64_t stop_after = 0;  // interrupt before this iteration, as Ctrl-C would; 0: never (tests)
+  uint64_t stop_after = 0;                                           // interrupt before this iteration, as Ctrl-C would; 0: never (tests)
+  std::shared_ptr<const model::FakeQuantisation> fake_quantisation;  // of the UNet while training; needs settings.bf16 off. Null: none
+  nlohmann::json notes = nlohmann::json::object();                   // further entries of a new run's run.json
 };
 
 struct TrainResult {
