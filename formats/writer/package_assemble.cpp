@@ -24,8 +24,10 @@ auto build_list(FlatBufferBuilder& builder, const std::vector<Entry>& entries, B
 Offset<schema::Provenance> build_provenance(FlatBufferBuilder& b, const Provenance& p) {
   const auto text = [&](const std::string& value) { return b.CreateString(value); };
   const auto tool = text(p.tool), created = text(p.created);
-  const auto settings =
-      build_list(b, p.settings, [&](const KeyValue& entry) { return schema::CreateSetting(b, text(entry.key), text(entry.value)); });
+  const auto settings = build_list(b, p.settings, [&](const KeyValue& entry) {
+    const auto value = text(entry.value);  // one after the other: the order of arguments, and with it the bytes, is the compiler's choice
+    return schema::CreateSetting(b, text(entry.key), value);
+  });
   const auto sources = build_list(b, p.sources, text);
   const auto quality =
       build_list(b, p.quality, [&](const QualityMetric& entry) { return schema::CreateQualityMetric(b, text(entry.name), entry.value); });
