@@ -2,6 +2,7 @@
 
 #include <variant>
 
+#include "formats/src/checksum.h"
 #include "formats/src/package_content.h"
 
 namespace figurine {
@@ -146,6 +147,8 @@ std::string format_hash(const std::array<uint64_t, 2>& hash) {
   }
   return digits;
 }
+
+std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8) { return xxh3_128(std::as_bytes(rgba8)); }
 
 Status check_avatar_fits_body(const Avatar& avatar, const Package& package) {
   const auto mismatch = [&](std::initializer_list<Word> why) {

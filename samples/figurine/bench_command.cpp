@@ -1,13 +1,14 @@
-// figurine bench: what a frame costs on this machine, stage by stage, on one thread and on several. Every frame has a fresh pose and a run
-// of the network.
+// figurine bench: what a frame costs on this machine, stage by stage, in every precision that the package holds, on one thread and on
+// several. Every frame has a fresh pose and a run of the network.
 //
-// The thread counts take turns frame by frame, so that whatever else the machine does falls on all of them alike; medians are compared, not
-// means.
+// Precisions and thread counts take turns frame by frame, so that whatever else the machine does falls on all of them alike; medians are
+// compared, not means.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "ports/linux/files.h"
 #include "samples/figurine/allocation_counter.h"
@@ -35,6 +36,7 @@ struct BenchOptions {
 
 // One renderer with its own copy of the cast and what its frames cost.
 struct Lane {
+  Precision precision = Precision::kFloat32;
   uint32_t threads = 1;
   std::unique_ptr<Renderer> renderer;
   std::unique_ptr<Cast> cast;
@@ -76,7 +78,7 @@ Status open_lane(const BenchOptions& options, RendererOptions renderer_options, 
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
   if (!renderer.ok()) return renderer.status();
   lane.renderer = std::move(*renderer);
-  FIG_RETURN_IF_ERROR(lane.cast->add_to(*lane.renderer));
+  FIG_RETURN_IF_ERROR(lane.cast->add_to(*lane.renderer, lane.precision));
   first.prepare_ms = ms_since(start_ns);
   const Camera& camera = lane.cast->avatar(0).package.avatar().golden.camera;
   RenderedFrame frame({camera.width_px, camera.height_px}, PixelFormat::kRgba8);
@@ -86,8 +88,20 @@ Status open_lane(const BenchOptions& options, RendererOptions renderer_options, 
   return {};
 }
 
+// What is asked for; otherwise all that the avatar holds, the renderer's own choice first.
+Result<std::vector<Precision>> choose_precisions(const BenchOptions& options) {
+  if (const std::optional<Precision> asked = options.device.network_precision()) return std::vector<Precision>{*asked};
+  const Result<std::unique_ptr<LoadedPackage>> avatar = load_package(options.cast.avatars[0], PackageKind::kAvatar);
+  if (!avatar.ok()) return avatar.status();
+  std::vector<Precision> precisions;
+  for (const Precision precision : {Precision::kFixedPoint, Precision::kFloat32}) {
+    if ((*avatar)->package.avatar().holds(precision)) precisions.push_back(precision);
+  }
+  return precisions;
+}
+
 nlohmann::ordered_json lane_json(const Lane& lane) {
-  nlohmann::ordered_json json = {{"threads", lane.threads}};
+  nlohmann::ordered_json json = {{"threads", lane.threads}, {"precision", to_string(lane.precision)}};
   json["frames_per_second"] = 1000 / std::max(lane.log.total_ms().median, 1e-6);
   json["stages_ms"] = lane.log.stages_json();
   json["work"] = lane.log.work_json();
@@ -103,7 +117,9 @@ void print_table(const nlohmann::ordered_json& json) {
   std::printf("%s, %s\n", json["machine"]["cpu"].get<std::string>().c_str(), json["date"].get<std::string>().c_str());
   std::printf("%u frames of %ux%u, a fresh pose each; milliseconds, median (90th percentile)\n\n", json["frames"].get<uint32_t>(),
               json["size"][0].get<uint32_t>(), json["size"][1].get<uint32_t>());
-  std::printf("%-12s", "threads");
+  std::printf("%-12s", "precision");
+  for (const auto& lane : lanes) std::printf("%20s", lane["precision"].get<std::string>().c_str());
+  std::printf("\n%-12s", "threads");
   for (const auto& lane : lanes) std::printf("%20u", lane["threads"].get<uint32_t>());
   std::printf("\n");
   for (const auto& [stage, first] : lanes[0]["stages_ms"].items()) {
@@ -127,7 +143,8 @@ void print_table(const nlohmann::ordered_json& json) {
   if (!lanes[0]["allocations_per_frame"].is_null()) {
     std::printf("allocations a frame:");
     for (const auto& lane : lanes)
-      std::printf(" %.2f (%u threads)", lane["allocations_per_frame"].get<double>(), lane["threads"].get<uint32_t>());
+      std::printf(" %.2f (%s, %u threads)", lane["allocations_per_frame"].get<double>(), lane["precision"].get<std::string>().c_str(),
+                  lane["threads"].get<uint32_t>());
     std::printf("\n");
   }
 }
@@ -142,14 +159,20 @@ Status run_bench(const BenchOptions& options) {
     rig.size = *size;
   }
 
+  const Result<std::vector<Precision>> precisions = choose_precisions(options);
+  if (!precisions.ok()) return precisions.status();
   std::vector<Lane> lanes;
   FirstFrame first;
   uint64_t peak_bytes = 0;
-  std::vector<uint32_t> thread_counts = {1};
-  if (renderer_options->threads > 1) thread_counts.push_back(renderer_options->threads);
+  std::vector<std::pair<Precision, uint32_t>> ways;
+  for (const Precision precision : *precisions) {
+    ways.emplace_back(precision, 1);
+    if (renderer_options->threads > 1) ways.emplace_back(precision, renderer_options->threads);
+  }
   std::unique_ptr<RenderedFrame> frame;
-  for (const uint32_t threads : thread_counts) {
+  for (const auto& [precision, threads] : ways) {
     Lane lane;
+    lane.precision = precision;
     lane.threads = threads;
     FirstFrame again;
     FIG_RETURN_IF_ERROR(open_lane(options, *renderer_options, lane, lanes.empty() ? first : again));
@@ -176,7 +199,7 @@ Status run_bench(const BenchOptions& options) {
 
   nlohmann::ordered_json json = json_header("bench");
   json["date"] = date_utc();
-  json["machine"] = json_machine(options.device, renderer_options->threads);
+  json["machine"] = json_machine(options.device, renderer_options->threads, to_string(lanes[0].precision));
   json["avatar"] = options.cast.avatars[0];
   json["avatar_bytes"] = lanes[0].cast->avatar(0).package.size_bytes();
   json["body_bytes"] = lanes[0].cast->body(0).package.size_bytes();

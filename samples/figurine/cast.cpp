@@ -88,13 +88,25 @@ Result<std::vector<uint32_t>> Cast::frames(const FrameRange& range) const {
   return frames;
 }
 
-Status Cast::add_to(Renderer& renderer) {
+Status Cast::add_to(Renderer& renderer, std::optional<Precision> precision) {
   for (size_t i = 0; i < members_.size(); ++i) {
-    const Result<AvatarId> id = renderer.add_avatar(members_[i].avatar->package, members_[i].body->package);
+    const Result<AvatarId> id = renderer.add_avatar(members_[i].avatar->package, members_[i].body->package, precision);
     if (!id.ok()) return id.status().within(members_[i].avatar->path);
     posed_[i].avatar = *id;
   }
   return {};
+}
+
+std::string Cast::precision(const Renderer& renderer) const {
+  const Precision first = renderer.precision(posed_[0].avatar);
+  const bool same =
+      std::all_of(posed_.begin(), posed_.end(), [&](const FrameAvatar& each) { return renderer.precision(each.avatar) == first; });
+  return same ? to_string(first) : "mixed";
+}
+
+bool Cast::holds(Precision precision) const {
+  return std::all_of(members_.begin(), members_.end(),
+                     [&](const Member& member) { return member.avatar->package.avatar().holds(precision); });
 }
 
 std::span<const FrameAvatar> Cast::pose(uint32_t frame) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 #include "figurine/renderer.h"
@@ -15,7 +16,7 @@ class App;
 namespace figurine::samples {
 
 struct DeviceOptions {
-  std::string precision = "f32";
+  std::string precision;  // empty: the best that an avatar holds
   std::string isa = "scalar";
   uint32_t threads = 0;  // 0: as many as there are CPUs, 8 at most
   bool json = false;
@@ -24,12 +25,14 @@ struct DeviceOptions {
   void add_to(CLI::App& app, bool json_flag = true);
   // kUnsupported for what this build cannot do, never a silent replacement.
   Result<RendererOptions> renderer_options() const;
+  // As asked for; without, the renderer's own choice. renderer_options() has looked at it.
+  std::optional<Precision> network_precision() const;
 };
 
 // "command" and "version", the first fields of every --json output (docs/json.md).
 nlohmann::ordered_json json_header(const char* command);
-// CPU, usable CPUs, threads in use, precision and kernels.
-nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threads);
+// CPU, usable CPUs, threads in use, precision of the networks that ran, and kernels.
+nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threads, const std::string& precision);
 void print_json(const nlohmann::ordered_json& json);
 
 }  // namespace figurine::samples

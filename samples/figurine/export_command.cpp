@@ -30,7 +30,7 @@ Status run_export(const ExportOptions& options) {
   if (!frames.ok()) return frames.status();
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
   if (!renderer.ok()) return renderer.status();
-  FIG_RETURN_IF_ERROR(cast->add_to(**renderer));
+  FIG_RETURN_IF_ERROR(cast->add_to(**renderer, options.device.network_precision()));
   const FrameAvatar posed = cast->pose(options.frame)[0];
   const Result<GaussianView> gaussians = (*renderer)->pose_avatar(posed.avatar, posed.pose);
   if (!gaussians.ok()) return gaussians.status();
@@ -41,6 +41,7 @@ Status run_export(const ExportOptions& options) {
     json["avatar"] = options.cast.avatars[0];
     json["output"] = options.output;
     json["frame"] = options.frame;
+    json["precision"] = cast->precision(**renderer);
     json["gaussians"] = gaussians->count;
     json["sh_degree"] = gaussians->sh_degree;
     json["size_bytes"] = bytes.size();

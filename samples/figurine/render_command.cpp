@@ -81,7 +81,7 @@ Status run_render(const RenderOptions& options) {
 
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
   if (!renderer.ok()) return renderer.status();
-  FIG_RETURN_IF_ERROR(job->cast.add_to(**renderer));
+  FIG_RETURN_IF_ERROR(job->cast.add_to(**renderer, options.device.network_precision()));
   const Result<std::vector<Camera>> cameras = place_cameras(job->rig, job->frames, job->cast, **renderer);
   if (!cameras.ok()) return cameras.status();
   const ImageSize size{cameras->front().width_px, cameras->front().height_px};
@@ -140,7 +140,7 @@ Status run_render(const RenderOptions& options) {
     json["work"] = log.work_json();
     json["renderer_memory_bytes"] = (*renderer)->memory_bytes();
     json["peak_memory_bytes"] = peak_memory_bytes();
-    json["machine"] = json_machine(options.device, renderer_options->threads);
+    json["machine"] = json_machine(options.device, renderer_options->threads, job->cast.precision(**renderer));
     print_json(json);
   }
   return {};

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <system_error>
 
 #include "ports/linux/files.h"
@@ -28,6 +29,7 @@ namespace {
 // What a setting may turn. A new kind of speed-up adds a member here and a row to dials().
 struct Knobs {
   SplatOptions splat;
+  std::optional<Precision> precision;  // without: the one that the report is made in
 };
 
 struct Setting {
@@ -39,8 +41,9 @@ struct Setting {
 
 struct Dial {
   std::string name, meaning;
-  double theoretical_order = 0;  // error ~ value^order
+  std::optional<double> theoretical_order;  // error ~ value^order; none: settings to choose from, with no order between them
   std::string theory;
+  Knobs reference;
   std::vector<Stage> stages;      // that the dial can make cheaper: their time is the cost that is plotted
   std::vector<Setting> settings;  // from coarse to fine
 };
@@ -59,6 +62,7 @@ Dial alpha_cut_dial() {
       .theory =
           "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is missing from the picture falls in proportion to the "
           "cut.",
+      .reference = {.splat = {.alpha_cut = kReferenceCut}, .precision = {}},
       .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve},
       .settings = {}};
   for (const int inverse : {16, 32, 64, 128, 255, 512, 1024, 4096, 16384}) {
@@ -66,12 +70,37 @@ Dial alpha_cut_dial() {
     dial.settings.push_back({.label = "1/" + std::to_string(inverse),
                              .value = cut,
                              .is_default = static_cast<float>(cut) == kAlphaCut,
-                             .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)}}});
+                             .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)}, .precision = {}}});
   }
   return dial;
 }
 
-std::vector<Dial> dials() { return {alpha_cut_dial()}; }
+// Both settings at the reference's alpha cut, which costs the network nothing: what is left of the difference is the precision's own.
+Dial precision_dial() {
+  constexpr SplatOptions kSplat{.alpha_cut = kReferenceCut};
+  return {.name = "precision",
+          .meaning =
+              "arithmetic of the network: q8 (int8 weights and activations) or f32, this dial's reference; the value is the step of a "
+              "number that fills its range",
+          .theoretical_order = std::nullopt,
+          .theory = "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the layers add their errors up.",
+          .reference = {.splat = kSplat, .precision = Precision::kFloat32},
+          .stages = {Stage::kNetwork},
+          .settings = {{.label = to_string(Precision::kFixedPoint),
+                        .value = 0x1p-8,
+                        .is_default = true,
+                        .knobs = {.splat = kSplat, .precision = Precision::kFixedPoint}},
+                       {.label = to_string(Precision::kFloat32),
+                        .value = 0x1p-24,
+                        .is_default = false,
+                        .knobs = {.splat = kSplat, .precision = Precision::kFloat32}}}};
+}
+
+std::vector<Dial> dials(bool both_precisions) {
+  std::vector<Dial> table = {alpha_cut_dial()};
+  if (both_precisions) table.push_back(precision_dial());
+  return table;
+}
 
 struct ReportOptions {
   CastOptions cast;
@@ -85,15 +114,32 @@ struct Measurement {
   FrameLog log;
 };
 
+// A renderer with its own copy of the cast, in one precision.
+struct Troupe {
+  std::unique_ptr<Renderer> renderer;
+  std::unique_ptr<Cast> cast;
+};
+
+Result<Troupe> assemble(const CastOptions& options, const RendererOptions& renderer_options, std::optional<Precision> precision) {
+  Result<Cast> cast = Cast::load(options);
+  if (!cast.ok()) return cast.status();
+  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
+  if (!renderer.ok()) return renderer.status();
+  FIG_RETURN_IF_ERROR(cast->add_to(**renderer, precision));
+  return Troupe{std::move(*renderer), std::make_unique<Cast>(std::move(*cast))};
+}
+
 // Draws frame number i of the run with any setting.
 class Studio {
  public:
-  Studio(Cast& cast, Renderer& renderer, std::vector<uint32_t> frames, std::vector<Camera> cameras)
-      : cast_(cast), renderer_(renderer), frames_(std::move(frames)), cameras_(std::move(cameras)) {}
+  // floats: for settings that ask for f32, where the first troupe has another precision; may be empty.
+  Studio(Troupe first, Troupe floats, std::vector<uint32_t> frames, std::vector<Camera> cameras)
+      : first_(std::move(first)), floats_(std::move(floats)), frames_(std::move(frames)), cameras_(std::move(cameras)) {}
 
   Status draw(uint32_t i, const Knobs& knobs, RenderedFrame& picture) {
-    const std::span<const FrameAvatar> posed = cast_.moves() ? cast_.pose(frames_[i % frames_.size()]) : cast_.sway(i);
-    return renderer_.render({.camera = cameras_[i % cameras_.size()], .avatars = posed, .splat = knobs.splat}, picture.target());
+    Troupe& troupe = troupe_of(knobs);
+    const std::span<const FrameAvatar> posed = troupe.cast->moves() ? troupe.cast->pose(frames_[i % frames_.size()]) : troupe.cast->sway(i);
+    return troupe.renderer->render({.camera = cameras_[i % cameras_.size()], .avatars = posed, .splat = knobs.splat}, picture.target());
   }
   Status measure(uint32_t i, const Setting& setting, const RenderedFrame& truth, RenderedFrame& u8, RenderedFrame& f32,
                  Measurement& result) {
@@ -101,14 +147,15 @@ class Studio {
     add_foreground_error(truth.f32, f32.f32, result.error);
     const uint64_t start_ns = now_ns();  // timed by itself, into the 8-bit picture that a user sees
     FIG_RETURN_IF_ERROR(draw(i, setting.knobs, u8));
-    result.log.add(renderer_.statistics(), now_ns() - start_ns);
+    result.log.add(troupe_of(setting.knobs).renderer->statistics(), now_ns() - start_ns);
     return {};
   }
   ImageSize size() const { return {cameras_[0].width_px, cameras_[0].height_px}; }
 
  private:
-  Cast& cast_;
-  Renderer& renderer_;
+  Troupe& troupe_of(const Knobs& knobs) { return knobs.precision == Precision::kFloat32 && floats_.renderer != nullptr ? floats_ : first_; }
+
+  Troupe first_, floats_;
   std::vector<uint32_t> frames_;
   std::vector<Camera> cameras_;
 };
@@ -153,7 +200,7 @@ Result<std::vector<std::byte>> draw_difference(const ports::ImageF32& truth, con
 Status draw_pictures(Studio& studio, uint32_t frame, const Dial& dial, std::vector<ReportPicture>& pictures) {
   constexpr float kGain = 32;
   RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32), picture(studio.size(), PixelFormat::kRgbaF32);
-  FIG_RETURN_IF_ERROR(studio.draw(frame, {.splat = {.alpha_cut = kReferenceCut}}, truth));
+  FIG_RETURN_IF_ERROR(studio.draw(frame, dial.reference, truth));
   const Box box = foreground_box(truth.f32);
   Result<std::vector<std::byte>> png = draw_difference(truth.f32, truth.f32, box, 0);
   if (!png.ok()) return png.status();
@@ -186,8 +233,8 @@ nlohmann::ordered_json overall_order(const Dial& dial, const std::vector<Measure
 }
 
 nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement>& measurements) {
-  nlohmann::ordered_json json = {
-      {"name", dial.name}, {"meaning", dial.meaning}, {"theoretical_order", dial.theoretical_order}, {"theory", dial.theory}};
+  nlohmann::ordered_json json = {{"name", dial.name}, {"meaning", dial.meaning}, {"theoretical_order", nullptr}, {"theory", dial.theory}};
+  if (dial.theoretical_order) json["theoretical_order"] = *dial.theoretical_order;
   json["observed_order"] = overall_order(dial, measurements);
   json["stages"] = nlohmann::ordered_json::array();
   for (const Stage stage : dial.stages) json["stages"].push_back(to_string(stage));
@@ -235,31 +282,33 @@ Status run_report(const ReportOptions& options) {
     if (!size.ok()) return size.status();
     rig.size = *size;
   }
-  Result<Cast> cast = Cast::load(options.cast);
-  if (!cast.ok()) return cast.status();
+  Result<Troupe> first = assemble(options.cast, *renderer_options, options.device.network_precision());
+  if (!first.ok()) return first.status();
+  Cast& cast = *first->cast;
+  const bool both = options.device.precision.empty() && cast.holds(Precision::kFloat32) && cast.holds(Precision::kFixedPoint);
+  Result<Troupe> floats = both ? assemble(options.cast, *renderer_options, Precision::kFloat32) : Troupe{};
+  if (!floats.ok()) return floats.status();
   // Evenly over the whole motion.
-  const Result<std::vector<uint32_t>> all = cast->frames({});
+  const Result<std::vector<uint32_t>> all = cast.frames({});
   if (!all.ok()) return all.status();
   std::vector<uint32_t> frames;
   for (uint32_t i = 0; i < std::min<size_t>(options.frames, all->size()); ++i) {
     frames.push_back((*all)[size_t(i) * all->size() / std::min<size_t>(options.frames, all->size())]);
   }
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
-  if (!renderer.ok()) return renderer.status();
-  FIG_RETURN_IF_ERROR(cast->add_to(**renderer));
-  Result<std::vector<Camera>> cameras = place_cameras(rig, frames, *cast, **renderer);
+  Result<std::vector<Camera>> cameras = place_cameras(rig, frames, cast, *first->renderer);
   if (!cameras.ok()) return cameras.status();
-  Studio studio(*cast, **renderer, std::move(frames), std::move(*cameras));
+  const std::string precision = cast.precision(*first->renderer);
+  Studio studio(std::move(*first), std::move(*floats), std::move(frames), std::move(*cameras));
 
-  const std::vector<Dial> table = dials();
+  const std::vector<Dial> table = dials(both);
   std::vector<std::vector<Measurement>> measurements;
   for (const Dial& dial : table) measurements.emplace_back(dial.settings.size());
   RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32), f32(studio.size(), PixelFormat::kRgbaF32),
       u8(studio.size(), PixelFormat::kRgba8);
   Progress progress("report", options.frames);
   for (uint32_t i = 0; i < options.frames; ++i) {
-    FIG_RETURN_IF_ERROR(studio.draw(i, {.splat = {.alpha_cut = kReferenceCut}}, truth));
     for (size_t d = 0; d < table.size(); ++d) {
+      FIG_RETURN_IF_ERROR(studio.draw(i, table[d].reference, truth));
       const size_t count = table[d].settings.size();
       for (size_t turn = 0; turn < count; ++turn) {  // another setting begins each round: nobody is always first after the reference
         FIG_RETURN_IF_ERROR(check_interrupt());
@@ -272,7 +321,7 @@ Status run_report(const ReportOptions& options) {
 
   nlohmann::ordered_json json = json_header("report");
   json["date"] = date_utc();
-  json["machine"] = json_machine(options.device, renderer_options->threads);
+  json["machine"] = json_machine(options.device, renderer_options->threads, precision);
   json["avatar"] = options.cast.avatars[0];
   json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(options.cast.motions[0]);
   json["frames"] = options.frames;

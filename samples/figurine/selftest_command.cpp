@@ -1,9 +1,13 @@
-// figurine selftest: draws the package's golden frame on this device and compares it with the picture that the trainer's renderer made of
-// it.
+// figurine selftest: draws the package's golden frame on this device and compares it: in float with the picture that the trainer's renderer
+// made of it, in fixed point with the hash that it has on every device.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
+#include <format>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
 
 #include "ports/linux/png.h"
 #include "samples/figurine/cast.h"
@@ -48,49 +52,118 @@ Comparison compare(const ports::ImageU8& golden, const ports::ImageU8& device, c
   return result;
 }
 
-Status run_selftest(const SelftestOptions& options) {
-  const Result<RendererOptions> renderer_options = options.device.renderer_options();
-  if (!renderer_options.ok()) return renderer_options.status();
-  const std::string& path = options.cast.avatars[0];
+// The golden frame as this device draws it.
+struct Golden {
+  RenderedFrame picture;      // over the golden background
+  RenderedFrame transparent;  // for its alpha
+};
+
+Result<Golden> draw_golden(const SelftestOptions& options, const RendererOptions& renderer_options, Precision precision) {
   Result<Cast> cast = Cast::load(options.cast);
   if (!cast.ok()) return cast.status();
   const GoldenFrame& golden = cast->avatar(0).package.avatar().golden;
-  if (golden.png.empty()) return Status(StatusCode::kNotFound, path + ": golden frame: the package has no picture to compare with");
+  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
+  if (!renderer.ok()) return renderer.status();
+  FIG_RETURN_IF_ERROR(cast->add_to(**renderer, precision));
+  const ImageSize size{golden.camera.width_px, golden.camera.height_px};
+  Golden drawn{RenderedFrame(size, PixelFormat::kRgba8), RenderedFrame(size, PixelFormat::kRgbaF32)};
+  const std::span<const FrameAvatar> posed = cast->pose(0);
+  FIG_RETURN_IF_ERROR(
+      (*renderer)->render({.camera = golden.camera, .avatars = posed, .background = golden.background}, drawn.picture.target()));
+  FIG_RETURN_IF_ERROR((*renderer)->render({.camera = golden.camera, .avatars = posed}, drawn.transparent.target()));
+  return drawn;
+}
+
+// What one precision says of itself: in JSON, to people, and in one line if it failed.
+struct Verdict {
+  bool passed = false;
+  nlohmann::ordered_json json;
+  std::string text, reason;
+};
+
+Result<Verdict> compare_floats(const SelftestOptions& options, const RendererOptions& renderer_options, const GoldenFrame& golden) {
+  const std::string& path = options.cast.avatars[0];
   const Result<ports::ImageU8> expected = ports::decode_png(std::as_bytes(golden.png), path + ": golden frame");
   if (!expected.ok()) return expected.status();
   if (expected->width_px != golden.camera.width_px || expected->height_px != golden.camera.height_px || expected->channels < 3) {
     return Status(StatusCode::kCorrupt, path + ": golden frame: the picture's size or channels are not the camera's");
   }
-
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
-  if (!renderer.ok()) return renderer.status();
-  FIG_RETURN_IF_ERROR(cast->add_to(**renderer));
-  const ImageSize size{golden.camera.width_px, golden.camera.height_px};
-  RenderedFrame picture(size, PixelFormat::kRgba8), transparent(size, PixelFormat::kRgbaF32);
-  const std::span<const FrameAvatar> posed = cast->pose(0);
-  FIG_RETURN_IF_ERROR((*renderer)->render({.camera = golden.camera, .avatars = posed, .background = golden.background}, picture.target()));
-  FIG_RETURN_IF_ERROR((*renderer)->render({.camera = golden.camera, .avatars = posed}, transparent.target()));
-
-  const Comparison result = compare(*expected, picture.u8, transparent.f32, golden.background);
+  const Result<Golden> drawn = draw_golden(options, renderer_options, Precision::kFloat32);
+  if (!drawn.ok()) return drawn.status();
+  const Comparison result = compare(*expected, drawn->picture.u8, drawn->transparent.f32, golden.background);
   const double psnr_db = result.error.psnr_db();
-  const bool passed = result.foreground > 0 && psnr_db >= kLeastPsnr_db;
+  const long largest = std::lround(result.error.largest * 255);
+  Verdict verdict{.passed = result.foreground > 0 && psnr_db >= kLeastPsnr_db, .json = {}, .text = {}, .reason = {}};
+  verdict.json["psnr_db"] = std::isinf(psnr_db) ? nlohmann::ordered_json() : nlohmann::ordered_json(psnr_db);  // null: equal to the bit
+  verdict.json["least_psnr_db"] = kLeastPsnr_db;
+  verdict.json["largest_difference_levels"] = largest;
+  verdict.json["foreground_pixels"] = result.foreground;
+  verdict.text = std::format("f32: golden frame {}: {:.2f} dB over {} foreground pixels (at least {:.0f}), largest difference {} of 255",
+                             verdict.passed ? "agrees" : "DIFFERS", psnr_db, result.foreground, kLeastPsnr_db, largest);
+  verdict.reason = "this device's picture differs from the trainer's";
+  return verdict;
+}
+
+Result<Verdict> compare_hashes(const SelftestOptions& options, const RendererOptions& renderer_options, const GoldenFrame& golden) {
+  const Result<Golden> drawn = draw_golden(options, renderer_options, Precision::kFixedPoint);
+  if (!drawn.ok()) return drawn.status();
+  const std::array<uint64_t, 2> hash = hash_picture(drawn->picture.u8.pixels);
+  const std::string here = format_hash(hash), there = format_hash(golden.fixed_point_hash);
+  Verdict verdict{.passed = hash == golden.fixed_point_hash, .json = {}, .text = {}, .reason = {}};
+  verdict.json["fixed_point"] = {{"passed", verdict.passed},
+                                 {"hash", here},
+                                 {"golden_hash", there},
+                                 {"library", network_library()},
+                                 {"golden_library", golden.fixed_point_library}};
+  verdict.text = verdict.passed ? "q8: golden frame agrees to the bit: " + here : "q8: golden frame DIFFERS: " + here + ", not " + there;
+  verdict.reason = std::format("in fixed point this device's picture is {} by {}, the package's {} by {}", here, network_library(), there,
+                               golden.fixed_point_library.empty() ? "an unknown library" : golden.fixed_point_library);
+  return verdict;
+}
+
+// In every precision asked for that the package has a golden picture of.
+Result<std::vector<Verdict>> judge(const SelftestOptions& options, const RendererOptions& renderer_options) {
+  const std::string& path = options.cast.avatars[0];
+  const Result<std::unique_ptr<LoadedPackage>> loaded = load_package(path, PackageKind::kAvatar);
+  if (!loaded.ok()) return loaded.status();
+  const Avatar& avatar = (*loaded)->package.avatar();
+  const std::optional<Precision> asked = options.device.network_precision();
+  const auto wanted = [&](Precision precision) { return asked ? *asked == precision : avatar.holds(precision); };
+  std::vector<Verdict> verdicts;
+  if (wanted(Precision::kFixedPoint) && avatar.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
+    Result<Verdict> verdict = compare_hashes(options, renderer_options, avatar.golden);
+    if (!verdict.ok()) return verdict.status();
+    verdicts.push_back(std::move(*verdict));
+  }
+  if (wanted(Precision::kFloat32) && !avatar.golden.png.empty()) {
+    Result<Verdict> verdict = compare_floats(options, renderer_options, avatar.golden);
+    if (!verdict.ok()) return verdict.status();
+    verdicts.push_back(std::move(*verdict));
+  }
+  if (verdicts.empty()) return Status(StatusCode::kNotFound, path + ": golden frame: the package has nothing to compare with");
+  return verdicts;
+}
+
+Status run_selftest(const SelftestOptions& options) {
+  const Result<RendererOptions> renderer_options = options.device.renderer_options();
+  if (!renderer_options.ok()) return renderer_options.status();
+  const std::string& path = options.cast.avatars[0];
+  const Result<std::vector<Verdict>> verdicts = judge(options, *renderer_options);
+  if (!verdicts.ok()) return verdicts.status();
+  const auto failed = std::find_if(verdicts->begin(), verdicts->end(), [](const Verdict& verdict) { return !verdict.passed; });
+  const bool passed = failed == verdicts->end();
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("selftest");
     json["avatar"] = path;
     json["passed"] = passed;
-    json["psnr_db"] = std::isinf(psnr_db) ? nlohmann::ordered_json() : nlohmann::ordered_json(psnr_db);  // null: equal to the bit
-    json["least_psnr_db"] = kLeastPsnr_db;
-    json["largest_difference_levels"] = std::lround(result.error.largest * 255);
-    json["foreground_pixels"] = result.foreground;
-    json["machine"] = json_machine(options.device, renderer_options->threads);
+    for (const Verdict& verdict : *verdicts) json.update(verdict.json);
+    const std::string precision = verdicts->size() > 1 ? "mixed" : verdicts->front().json.contains("fixed_point") ? "q8" : "f32";
+    json["machine"] = json_machine(options.device, renderer_options->threads, precision);
     print_json(json);
   } else {
-    std::printf("%s: golden frame %s: %.2f dB over %llu foreground pixels (at least %.0f), largest difference %ld of 255\n", path.c_str(),
-                passed ? "agrees" : "DIFFERS", psnr_db, static_cast<unsigned long long>(result.foreground), kLeastPsnr_db,
-                std::lround(result.error.largest * 255));
+    for (const Verdict& verdict : *verdicts) std::printf("%s: %s\n", path.c_str(), verdict.text.c_str());
   }
-  if (passed) return {};
-  return Status(StatusCode::kMismatch, path + ": golden frame: this device's picture differs from the trainer's");
+  return passed ? Status() : Status(StatusCode::kMismatch, path + ": golden frame: " + failed->reason);
 }
 
 }  // namespace

@@ -139,7 +139,7 @@ Status run_splat(const SplatCommandOptions& options) {
     json["stages_ms"] = log.stages_json();
     json["work"] = log.work_json();
     json["peak_memory_bytes"] = peak_memory_bytes();
-    json["machine"] = json_machine(options.device, renderer_options->threads);
+    json["machine"] = json_machine(options.device, renderer_options->threads, to_string(Precision::kFloat32));
     print_json(json);
   }
   return {};

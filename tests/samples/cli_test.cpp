@@ -264,6 +264,59 @@ TEST_F(Cli, BenchReportsEveryStage) {
   EXPECT_GT(json["first_frame_ms"]["total"], 0.0);
 }
 
+TEST_F(Cli, BenchMeasuresEveryPrecisionThatThePackageHolds) {
+  const auto ways = [&](const std::string& arguments) {
+    const ProgramRun result = run("bench " + arguments + " --frames 4 --threads 2 --json -");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::vector<std::string> list;
+    if (result.exit_code != 0) return list;
+    const Json json = Json::parse(result.out);
+    for (const Json& lane : json["runs"]) {
+      list.push_back(lane["precision"].get<std::string>() + " " + std::to_string(lane["threads"].get<int>()));
+      if (!lane["allocations_per_frame"].is_null()) {
+        EXPECT_EQ(lane["allocations_per_frame"], 0.0);
+      }
+    }
+    return list;
+  };
+  EXPECT_EQ(ways("P/both.fgn"), (std::vector<std::string>{"q8 1", "q8 2", "f32 1", "f32 2"}));
+  EXPECT_EQ(ways("P/fixed.fgn"), (std::vector<std::string>{"q8 1", "q8 2"}));
+  EXPECT_EQ(ways("P/both.fgn --precision f32"), (std::vector<std::string>{"f32 1", "f32 2"}));
+}
+
+TEST_F(Cli, ReportHasADialOfPrecisionsWhereThereAreTwo) {
+  const ProgramRun result = run("report P/both.fgn --motion P/motion.fgn --frames 2 --json -o r");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = Json::parse(result.out);
+  ASSERT_EQ(json["dials"].size(), 2u);
+  const Json& settings = json["dials"][1]["settings"];
+  ASSERT_EQ(settings.size(), 2u);
+  EXPECT_EQ(settings[0]["label"], "q8");
+  EXPECT_GT(settings[0]["psnr_db"], 20);
+  EXPECT_EQ(settings[1]["label"], "f32");
+  EXPECT_TRUE(settings[1]["psnr_db"].is_null()) << "the reference itself";
+  EXPECT_NE(folder_.read("r/report.html").find("Precision"), std::string::npos);
+  EXPECT_EQ(json["machine"]["precision"], "q8");
+  ASSERT_EQ(run("report P/both.fgn --precision q8 --frames 1 -o r").exit_code, 0);
+  EXPECT_EQ(Json::parse(folder_.read("r/report.json"))["dials"].size(), 1u);
+}
+
+TEST_F(Cli, EveryCommandTakesAPrecision) {
+  const auto precision = [&](const std::string& arguments) {
+    const ProgramRun result = run("render " + arguments + " --size 32x32 --json -o x.png");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.exit_code == 0 ? Json::parse(result.out)["machine"]["precision"].get<std::string>() : "";
+  };
+  EXPECT_EQ(precision("P/avatar.fgn"), "f32");
+  EXPECT_EQ(precision("P/fixed.fgn"), "q8");
+  EXPECT_EQ(precision("P/both.fgn"), "q8");
+  EXPECT_EQ(precision("P/both.fgn --precision f32"), "f32");
+  EXPECT_EQ(precision("P/avatar.fgn P/fixed.fgn"), "mixed");
+  ASSERT_EQ(run("export P/both.fgn -o q8.ply").exit_code, 0);
+  ASSERT_EQ(run("export P/both.fgn --precision f32 -o f32.ply").exit_code, 0);
+  EXPECT_NE(folder_.read("q8.ply"), folder_.read("f32.ply"));
+}
+
 TEST_F(Cli, ReportPlotsTheAlphaCut) {
   const ProgramRun result = run("report P/avatar.fgn --motion P/motion.fgn --frames 3 -o r");
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -321,6 +374,40 @@ TEST_F(Cli, SelftestTellsTheRightPictureFromWrongOnes) {
   EXPECT_NE(run("selftest none.fgn").err.find("golden frame"), std::string::npos);
 }
 
+TEST_F(Cli, SelftestHoldsTheFrameInFixedPointToItsHash) {
+  std::filesystem::copy(packages_->path("body.fgn"), folder_.path("body.fgn"));
+  write_golden_avatar(folder_, "wrong.fgn", "", Held::kFixedPoint, {1, 0x2000000000000000u});
+  const ProgramRun wrong = run("selftest wrong.fgn --json");
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_EQ(wrong.error_lines(), 1u) << wrong.err;
+  const Json said = Json::parse(wrong.out);
+  EXPECT_FALSE(said["passed"].get<bool>());
+  const std::string here = said["fixed_point"]["hash"], there = said["fixed_point"]["golden_hash"];
+  EXPECT_EQ(there, "20000000000000000000000000000001");
+  for (const std::string& words : {here, there, std::string("a library"), std::string("XNNPACK")}) {
+    EXPECT_NE(wrong.err.find(words), std::string::npos) << wrong.err;
+  }
+
+  const std::array<uint64_t, 2> hash = {std::stoull(here.substr(16), nullptr, 16), std::stoull(here.substr(0, 16), nullptr, 16)};
+  write_golden_avatar(folder_, "right.fgn", "", Held::kFixedPoint, hash);
+  for (const char* threads : {"1", "2"}) {
+    const ProgramRun right = run(std::string("selftest right.fgn --json --threads ") + threads);
+    EXPECT_EQ(right.exit_code, 0) << right.err;
+    EXPECT_EQ(Json::parse(right.out)["machine"]["precision"], "q8");
+    EXPECT_FALSE(Json::parse(right.out).contains("psnr_db")) << "nothing was compared in float";
+  }
+
+  // Both precisions: each has to agree.
+  ASSERT_EQ(run("render P/both.fgn --precision f32 --size 64x64 --background 0,0,0 -o black.png").exit_code, 0);
+  write_golden_avatar(folder_, "half.fgn", folder_.read("black.png"), Held::kBoth, hash);
+  const ProgramRun half = run("selftest half.fgn --json");
+  EXPECT_EQ(half.exit_code, 1);
+  EXPECT_TRUE(Json::parse(half.out)["fixed_point"]["passed"].get<bool>());
+  EXPECT_FALSE(Json::parse(half.out)["passed"].get<bool>());
+  EXPECT_EQ(run("selftest half.fgn --precision q8").exit_code, 0);
+  EXPECT_EQ(run("selftest half.fgn --precision f32").exit_code, 1);
+}
+
 TEST_F(Cli, RenderJsonHasWhatTheDemoNeeds) {
   const ProgramRun result = run("render P/avatar.fgn --motion P/motion.fgn --frames 0:4 --size 32x32 --json -o x.y4m");
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -374,7 +461,11 @@ TEST_F(Cli, BadInputGetsOneLineAndNoFile) {
   expect_refused("render P/avatar.fgn --background alpha -o x.y4m", 1, "alpha");
   expect_refused("render P/avatar.fgn", 1, "nothing to write");
   expect_refused("render P/avatar.fgn --size 100000x2 -o x.png", 1, "size");
-  expect_refused("render P/avatar.fgn --precision q8 -o x.png", 1, "unsupported in this build");
+  expect_refused("render P/avatar.fgn --precision q8 -o x.png", 1, "figurine-train pack --precision q8");
+  expect_refused("render P/fixed.fgn --precision f32 -o x.png", 1, "in q8 alone, not in f32");
+  expect_refused("bench P/fixed.fgn --precision f32", 1, "in q8 alone, not in f32");
+  expect_refused("selftest P/fixed.fgn --precision f32", 1, "nothing to compare with");
+  expect_refused("render P/avatar.fgn --precision f16 -o x.png", 1, "unsupported in this build");
   expect_refused("render P/avatar.fgn --isa avx2 -o x.png", 1, "unsupported in this build");
   expect_refused("render P/avatar.fgn P/avatar.fgn --place 0,0 -o x.png", 1, "place");
   expect_refused("splat P/missing.ply -o x.png", 1, "missing.ply");

@@ -80,11 +80,14 @@ ProgramRun run_shell(const std::string& command, const TestFolder& folder) {
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), streams.read("out"), streams.read("err")};
 }
 
-void write_golden_avatar(const TestFolder& folder, const std::string& name, const std::string& png) {
+void write_golden_avatar(const TestFolder& folder, const std::string& name, const std::string& png, Held held,
+                         const std::array<uint64_t, 2>& fixed_point_hash) {
   const SyntheticBody body = make_test_body();
-  const SyntheticAvatar synthetic = make_test_avatar(body);
+  const SyntheticAvatar synthetic = make_test_avatar(body, {.held = held});
   Avatar avatar = synthetic.package->avatar();
   avatar.golden.png = {reinterpret_cast<const uint8_t*>(png.data()), png.size()};
+  avatar.golden.fixed_point_hash = fixed_point_hash;
+  if (held != Held::kFloat32) avatar.golden.fixed_point_library = "a library";
   const Result<std::vector<std::byte>> bytes = write_package(avatar, synthetic.package->budget(), synthetic.package->provenance());
   FIG_CHECK(bytes.ok(), bytes.status().message().c_str());
   write_file(folder.path(name), *bytes);
@@ -96,6 +99,8 @@ void write_test_packages(const TestFolder& folder) {
   const SyntheticAvatar avatar = make_test_avatar(body);
   write_file(folder.path("body.fgn"), body.bytes.bytes());
   write_file(folder.path("avatar.fgn"), avatar.bytes.bytes());
+  write_file(folder.path("both.fgn"), make_test_avatar(body, {.held = Held::kBoth}).bytes.bytes());
+  write_file(folder.path("fixed.fgn"), make_test_avatar(body, {.held = Held::kFixedPoint}).bytes.bytes());
   write_file(folder.path("other_body.fgn"), other.bytes.bytes());
 
   constexpr uint32_t kFrames = 12;
