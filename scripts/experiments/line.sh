@@ -63,6 +63,7 @@ short_learning_rate_1e-4|--iterations $iterations --learning-rate 1e-4
 short_learning_rate_5e-4|--iterations $iterations --learning-rate 5e-4
 short_two_views|--iterations $iterations --views-per-pose 2
 short_warmup_300|--iterations $iterations --warmup 300
+short_spacing_0.45|--iterations $iterations --spacing-scale 0.45
 "
 while IFS='|' read -r name options; do
   [ -n "$name" ] || continue

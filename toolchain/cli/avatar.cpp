@@ -29,6 +29,7 @@ struct AvatarArguments {
   std::optional<std::string> preset, init, template_mode, fourier, precision, background;
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay;
+  std::optional<float> spacing_scale;
   std::optional<uint32_t> warmup, views;
   bool freeze_pose = false;
   uint32_t threads = 0;  // 0: all cores
@@ -55,6 +56,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   if (arguments.init) settings.init = *arguments.init;
   if (arguments.learning_rate) settings.schedule.peak = *arguments.learning_rate;
   if (arguments.weight_decay) settings.weight_decay = *arguments.weight_decay;
+  if (arguments.spacing_scale) settings.decoding.spacing_scale = *arguments.spacing_scale;
   if (arguments.warmup) settings.warmup_iterations = *arguments.warmup;
   if (arguments.views) settings.views_per_pose = *arguments.views;
   if (arguments.iterations) settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
@@ -172,6 +174,9 @@ void add_avatar_command(CLI::App& app) {
       ->check(CLI::IsMember({"black", "grey", "random"}));
   command->add_option("--views-per-pose", arguments->views, "Images of one pose an iteration (default 1, as in the paper)")
       ->check(CLI::Range(1, 64));
+  command
+      ->add_option("--spacing-scale", arguments->spacing_scale, "First radius of a Gaussian, in distances to the next texel (default 0.6)")
+      ->check(CLI::Range(0.05, 5.0));
   command->add_option("--warmup", arguments->warmup, "Iterations of fitting reference Gaussians first (default 0)");
   command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));
   command->callback([arguments] {

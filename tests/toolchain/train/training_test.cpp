@@ -1,7 +1,9 @@
 // Training itself, at the smallest size that shows anything: it beats a flat colour, a resumed run equals an uninterrupted one, bad input
 // is refused.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -227,6 +229,65 @@ TEST(TrainingInput, ACutOffCheckpointIsRefusedByName) {
   stopped.resume = true;
   stopped.stop_after = 0;
   EXPECT_NE(error_of(stopped).find("checkpoint.safetensors"), std::string::npos) << error_of(stopped);
+}
+
+// Files above this size cannot be written while it lives: what a full disk looks like to a program, without one.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t limit_bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{limit_bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+size_t count_files(const std::string& folder) {
+  return static_cast<size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+TEST(Training, OnAFullDiskStopsWithOneLineAndGoesOnFromTheLastCheckpoint) {
+  const TemporaryFolder folder;
+  const TrainRequest straight = request(folder.path("straight"), 20);
+  train_avatar(straight);
+  TrainRequest full = request(folder.path("full"), 20);
+  full.stop_after = 7;
+  EXPECT_THROW(train_avatar(full), Interrupted);
+  const RunDirectory run{full.run};
+  const std::string checkpoint = bytes_of(run.checkpoint());
+  const size_t files = count_files(full.run);
+  full.stop_after = 0;
+  full.resume = true;
+  {
+    const FullDisk disk(checkpoint.size() / 2);
+    EXPECT_NE(error_of(full).find("checkpoint.safetensors: write failed"), std::string::npos) << error_of(full);
+  }
+  EXPECT_EQ(bytes_of(run.checkpoint()), checkpoint);
+  EXPECT_EQ(count_files(full.run), files);  // nothing half-written is left behind
+  EXPECT_EQ(train_avatar(full).state.iteration, 20u);
+  EXPECT_EQ(bytes_of(run.weights()), bytes_of(RunDirectory{straight.run}.weights()));
+}
+
+TEST(Training, OfALossThatIsNotFiniteStopsAndNamesTheIteration) {
+  const TemporaryFolder folder;
+  TensorFile weights = read_tensor_file(RunDirectory{trained_run()}.weights());
+  // Colours whose squares overflow float: SSIM becomes infinity over infinity.
+  std::vector<float>& head_bias = weights.tensors.at("layer.14.bias").values;
+  for (size_t channel = 11; channel < 14; ++channel) head_bias.at(channel) = 1e25f;
+  write_tensor_file(folder.path("bright.safetensors"), weights);
+  TrainRequest bright = request(folder.path("run"), 5);
+  bright.settings.init = folder.path("bright.safetensors");
+  const std::string error = error_of(bright);
+  EXPECT_NE(error.find("iteration 0"), std::string::npos) << error;
+  EXPECT_NE(error.find("not finite"), std::string::npos) << error;
+  EXPECT_FALSE(fs::exists(RunDirectory{bright.run}.weights()));
 }
 
 }  // namespace
