@@ -31,5 +31,6 @@ struct Case {
 std::span<const Case> splat_cases();
 std::span<const Case> pose_cases();
 std::span<const Case> package_cases();
+std::span<const Case> fixed_point_cases();
 
 }  // namespace figurine::stability
