@@ -2,7 +2,8 @@
 
     line_report.py FOLDER OUTPUT COMMAND
 
-Nothing is computed here but differences; every figure names the run it comes from. Rows that were not trained are absent, figures that need them null.
+Nothing is computed here but differences; every figure names the run it comes from. Rows that FOLDER has no run for stay as OUTPUT has them: a row names its
+own command, commit and machine, so rows of several days can stand side by side. Rows that were never trained are absent, figures that need them null.
 """
 
 import datetime
@@ -28,9 +29,15 @@ def row(name, run):
     result["person_seed"] = read(run / "run.json")["data"]["seed"]
     for key in ("settings", "iterations", "train_seconds", "iterations_per_second", "breakdown_ms", "difference_psnr_db"):
         result[key] = report.get(key)
+    result["machine"] = report["machine"]
     for group in GROUPS:
         result[group] = report[group]
     return result
+
+
+# Rows of an earlier report; those from before rows named their machine were made on the report's.
+def earlier_rows(report):
+    return {row["name"]: {"machine": report["machine"], **row} for row in (report or {}).get("rows", [])}
 
 
 def figure(rows, name, *path):
@@ -42,17 +49,18 @@ def figure(rows, name, *path):
 
 def main(folder, output, command):
     folder = pathlib.Path(folder)
-    rows = {run.name: row(run.name, run) for run in sorted((folder / "runs").iterdir()) if (run / "evaluation.json").exists()}
-    if not rows:
+    new_rows = {run.name: row(run.name, run) for run in sorted((folder / "runs").iterdir()) if (run / "evaluation.json").exists()}
+    if not new_rows:
         sys.exit(f"line_report: {folder}: no evaluated run")
+    earlier = read(pathlib.Path(output)) or {}
+    rows = dict(sorted({**earlier_rows(earlier), **new_rows}.items()))
     main_row = "shipped"
-    reports = [read(folder / "runs" / name / "evaluation.json") for name in rows]
-    machine = next((report["machine"] for report in reports if report), None)
-    parity = read(folder / "parity.json") or {}
+    parity = read(folder / "parity.json") or earlier
     oracle = read(pathlib.Path("docs/results/splat_oracle.json")) or {}
     # Against the same trainer and the same number of iterations.
     posed, frozen = figure(rows, main_row, "held_out_poses", "psnr_db"), figure(rows, "shipped_frozen_pose", "held_out_poses", "psnr_db")
-    speed = read(folder / "runs" / "speed" / "run.json") or {}
+    speed_run = read(folder / "runs" / "speed" / "run.json")
+    speed = {"train_iterations_per_second": speed_run.get("iterations_per_second"), **speed_run} if speed_run else earlier
     result = {
         "psnr_view_db": figure(rows, main_row, "held_out_views", "psnr_db"),
         "psnr_pose_db": figure(rows, main_row, "held_out_poses", "psnr_db"),
@@ -66,13 +74,13 @@ def main(folder, output, command):
         "worst_parity_db": parity.get("worst_parity_db"),
         "splat_oracle_db": oracle.get("splat_oracle_db"),
         # One view an iteration on all cores of a quiet machine; the rows' own rates depend on what ran beside them.
-        "train_iterations_per_second": speed.get("iterations_per_second"),
+        "train_iterations_per_second": speed.get("train_iterations_per_second"),
         "breakdown_ms": speed.get("breakdown_ms"),
         "train_seconds": figure(rows, main_row, "train_seconds"),
         "rows": list(rows.values()),
         "command": command,
         "commit": os.environ.get("FIGURINE_COMMIT", "unknown"),
-        "machine": machine,
+        "machine": figure(rows, main_row, "machine"),  # of the main figures
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
     }
     temporary = pathlib.Path(output + ".tmp")
