@@ -30,7 +30,7 @@ struct EvaluateArguments {
   quantize::FineTuneOptions fine_tune;
   bool no_qat = false;
   std::vector<std::string> runs, packages;  // of quantization
-  std::string sheet, output, package;
+  std::string precision = "f32", sheet, output, package;
 };
 
 nlohmann::json report_head(const EvaluateArguments& arguments, const train::TrainedAvatar& avatar) {
@@ -80,6 +80,7 @@ void run_parity(const EvaluateArguments& arguments) {
   const verify::ParityReport parity = verify::compare_with_runtime(avatar, package.package, arguments.parity);
   nlohmann::json report = report_head(arguments, avatar);
   report["package"] = arguments.package;
+  report["precision"] = arguments.precision;
   report["package_hash"] = format_hash(package.package.content_hash());
   report["parity_db"] = finite(parity.psnr_db);
   report["worst_parity_db"] = finite(parity.worst_psnr_db);
@@ -170,11 +171,13 @@ void add_evaluate_command(CLI::App& app) {
   quantization->add_option("-o,--output", arguments->output, "Report to write, JSON");
   quantization->callback([arguments] { run_quantization(*arguments); });
 
-  CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, in float");
+  CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, before rounding to 8 bits");
   add_run_options(parity, arguments);
   parity->add_option("--package", arguments->package, "Avatar package made from the run")->required();
   parity->add_option("--views", arguments->parity.views, "Held-out pictures to compare (default 12)")->check(CLI::PositiveNumber);
+  parity->add_option("--precision", arguments->precision, "Of both (default f32)")->check(CLI::IsMember({"f32", "q8"}));
   parity->callback([arguments] {
+    arguments->parity.precision = arguments->precision == "q8" ? Precision::kFixedPoint : Precision::kFloat32;
     arguments->parity.threads = arguments->open.threads;
     run_parity(*arguments);
   });

@@ -76,12 +76,14 @@ void run(PackArguments arguments) {
     throw InputError("--qat: is for --precision q8");
   }
   const train::RunDirectory folder{arguments.open.run};
-  // Written twice: the first copy runs on the device's renderer, which then says how much memory it held.
+  // Written twice: the first copy runs on the device's renderer, which then says how much memory it held and what it drew.
   train::PackOptions options = arguments.pack;
   const AlignedCopy draft(train::pack_avatar(avatar, folder, options));
   const Package opened = value_or_throw(Package::open(draft.bytes(), arguments.output), arguments.output);
-  const train::GoldenView view = train::choose_golden_view(avatar);
-  options.peak_memory_bytes = verify::measure_memory(opened, avatar.body_file().package, view.pose.view(), view.camera);
+  const verify::GoldenRun golden = verify::draw_golden_frame(opened, avatar.body_file().package);
+  options.peak_memory_bytes = golden.memory_bytes;
+  options.fixed_point_hash = golden.fixed_point_hash;
+  if (quantised) options.fixed_point_library = golden.library;
   const std::vector<std::byte> bytes = train::pack_avatar(avatar, folder, options);
   throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
   std::printf("%s: %zu bytes, %.0f kB of memory on the device\n", arguments.output.c_str(), bytes.size(),
@@ -102,6 +104,7 @@ void add_pack_command(CLI::App& app) {
       ->check(CLI::IsMember({"f32", "q8", "f32,q8"}));
   command->add_flag("--qat", arguments->fine_tune, "Fine-tune for fixed point first, in RUN/qat; the run's own weights stay");
   command->add_option("--qat-iterations", arguments->fine_tuning.iterations, "Of the fine-tune (default 400)")->check(CLI::PositiveNumber);
+  command->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
   command->add_flag("--golden,!--no-golden", arguments->pack.golden, "Carry an expected picture (default)");
   command->add_option("--name", arguments->pack.name, "Name of the avatar (default: the identity's folder)");
   command->add_option("--licence", arguments->pack.licence_name, "Licence (synthetic persons: CC0-1.0)");

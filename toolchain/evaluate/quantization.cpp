@@ -223,6 +223,14 @@ std::shared_ptr<model::FakeQuantisation> int8_input(const quantize::Scales& scal
   return rounding;
 }
 
+// The rest stays float.
+std::shared_ptr<model::FakeQuantisation> only_input(std::shared_ptr<model::FakeQuantisation> rounding) {
+  rounding->round_weights.assign(rounding->round_weights.size(), false);
+  rounding->round_value.assign(rounding->round_value.size(), false);
+  rounding->round_value[0] = true;
+  return rounding;
+}
+
 std::shared_ptr<model::FakeQuantisation> float_head(const quantize::Scales& scales) {
   auto rounding = quantize::fake_quantisation(scales);
   rounding->round_weights.back() = false;
@@ -280,9 +288,7 @@ const char* name_of(LayerOp op) {
 // One row for every part that rounds: the input, each convolution's weights and output, each upsample's output.
 std::vector<std::pair<json, Variant>> single_layers(const Network& network, const torch::Tensor& weights, const quantize::Scales& scales) {
   std::vector<std::pair<json, Variant>> rows;
-  auto input = nothing_rounded(scales);
-  input->round_value[0] = true;
-  rows.push_back({{{"layer", "input"}}, {weights, input}});
+  rows.push_back({{{"layer", "input"}}, {weights, only_input(quantize::fake_quantisation(scales))}});
   for (size_t i = 0; i < network.layers.size(); ++i) {
     const LayerOp op = network.layers[i].op;
     if (op != LayerOp::kConv2d && op != LayerOp::kUpsample2) continue;
@@ -364,21 +370,19 @@ json compare_with_integers(Laboratory& laboratory, const Variant& variant, const
           {"largest_head_difference", head_difference}};
 }
 
-// What a row's calibration is called.
+// Rows that differ in their calibration alone. "ptq" is what a package gets.
 std::vector<std::pair<std::string, CalibrationOptions>> calibrations(const CalibrationOptions& chosen) {
   const auto with = [&](RangeMethod method, double percentile, WeightRange weights) {
     CalibrationOptions options = chosen;
     options.method = method, options.percentile = percentile, options.weights = weights;
     return options;
   };
-  CalibrationOptions other_weights = chosen;
-  other_weights.weights = chosen.weights == WeightRange::kMaxAbs ? WeightRange::kSmallestError : WeightRange::kMaxAbs;
   return {{"ptq", chosen},
-          {"ptq_minmax", with(RangeMethod::kMinMax, 0, chosen.weights)},
-          {"ptq_percentile_99.9", with(RangeMethod::kPercentile, 99.9, chosen.weights)},
-          {"ptq_percentile", with(RangeMethod::kPercentile, 99.99, chosen.weights)},
-          {"ptq_mse", with(RangeMethod::kSmallestError, 0, chosen.weights)},
-          {"ptq_other_weight_range", other_weights}};
+          {"ptq_minmax", with(RangeMethod::kMinMax, 0, WeightRange::kMaxAbs)},
+          {"ptq_percentile_99.9", with(RangeMethod::kPercentile, 99.9, WeightRange::kMaxAbs)},
+          {"ptq_percentile", with(RangeMethod::kPercentile, 99.99, WeightRange::kMaxAbs)},
+          {"ptq_mse", with(RangeMethod::kSmallestError, 0, WeightRange::kMaxAbs)},
+          {"ptq_mse_of_weights_too", with(RangeMethod::kSmallestError, 0, WeightRange::kSmallestError)}};
 }
 
 torch::Tensor weights_of(const std::string& file, model::PoseUNet& unet) {
@@ -390,27 +394,22 @@ torch::Tensor weights_of(const std::string& file, model::PoseUNet& unet) {
   return loaded;
 }
 
-// The network that a package would hold.
-struct Shipped {
-  std::string row;
-  Variant variant;
-  quantize::Scales scales;
-};
-
 std::vector<Row> make_rows(const Network& network, const quantize::ActivationStatistics& statistics, const CalibrationOptions& calibration,
-                           const Variant& ptq, const Shipped& shipped) {
+                           const Variant& ptq, const std::optional<Variant>& qat) {
   std::vector<Row> rows;
   for (const auto& [name, options] : calibrations(calibration)) {
     const quantize::Scales scales = quantize::choose_scales(network, statistics, options);
     rows.push_back({name, {ptq.weights, quantize::fake_quantisation(scales)}, name == "ptq"});
   }
-  if (shipped.row == "qat") {
-    rows.push_back({"qat", shipped.variant, true});
-    rows.push_back({"qat_weights_in_f32", {shipped.variant.weights, nullptr}});
+  if (qat) {
+    rows.push_back({"qat", *qat, true});
+    rows.push_back({"qat_weights_in_f32", {qat->weights, nullptr}});
   }
   const quantize::Scales scales = quantize::choose_scales(network, statistics, calibration);
   rows.push_back({"dynamic", {ptq.weights, dynamic_ranges(scales)}, true});
   rows.push_back({"ptq_int8_input", {ptq.weights, int8_input(scales, statistics.input_max)}, true});
+  rows.push_back({"only_input_int16", {ptq.weights, only_input(quantize::fake_quantisation(scales))}, true});
+  rows.push_back({"only_input_int8", {ptq.weights, only_input(int8_input(scales, statistics.input_max))}, true});
   rows.push_back({"ptq_float_head", {ptq.weights, float_head(scales)}, true});
   rows.push_back({"ptq_head_of_one_scale", {ptq.weights, head_of_one_scale(scales)}, true});
   return rows;
@@ -447,12 +446,12 @@ json evaluate_quantization(train::TrainedAvatar& avatar, const train::RunDirecto
   const quantize::ActivationStatistics statistics = quantize::observe_activations(avatar, options.calibration.poses);
   const quantize::Scales scales = quantize::choose_scales(network, statistics, options.calibration);
   const Variant ptq{unet.weights().detach().clone(), quantize::fake_quantisation(scales)};
-  Shipped shipped{"ptq", ptq, scales};
+  std::optional<Variant> qat;
   if (options.fine_tune) {
-    quantize::FineTuned tuned = quantize::fine_tune(avatar, run, *options.fine_tune);
-    shipped = {"qat", {weights_of(tuned.weights, unet), quantize::fake_quantisation(tuned.scales)}, std::move(tuned.scales)};
+    const quantize::FineTuned tuned = quantize::fine_tune(avatar, run, *options.fine_tune);
+    qat = {weights_of(tuned.weights, unet), quantize::fake_quantisation(tuned.scales)};
   }
-  const std::vector<Row> rows = make_rows(network, statistics, options.calibration, ptq, shipped);
+  const std::vector<Row> rows = make_rows(network, statistics, options.calibration, ptq, qat);
   const std::vector<std::pair<json, Variant>> layers = single_layers(network, ptq.weights, scales);
 
   const train::InterruptGuard interrupt;
@@ -478,7 +477,7 @@ json evaluate_quantization(train::TrainedAvatar& avatar, const train::RunDirecto
     entry["name"] = row.name;
     if (row.sequences) entry.update(laboratory.score_sequences(row.variant));
     report["rows"].push_back(entry);
-    if (row.name == shipped.row) report["worst_poses"] = worst_poses(laboratory, score, plain);
+    if (row.name == "ptq") report["worst_poses"] = worst_poses(laboratory, score, plain);
   }
   for (const auto& [name, variant] : layers) {
     step("layer " + name.at("layer").dump());
@@ -486,14 +485,12 @@ json evaluate_quantization(train::TrainedAvatar& avatar, const train::RunDirecto
     entry.update(describe(laboratory.score(variant), plain));
     report["layers"].push_back(entry);
   }
-  report["shipped"] = shipped.row;
-  report["saturation"] = count_saturation(laboratory, shipped.variant, shipped.scales);
-  report["integer_reference"] = compare_with_integers(laboratory, shipped.variant, shipped.scales, options.integer_poses);
+  report["saturation"] = count_saturation(laboratory, ptq, scales);
+  report["integer_reference"] = compare_with_integers(laboratory, ptq, scales, options.integer_poses);
   return report;
 }
 
 json summarise_quantization(const std::vector<json>& reports) {
-  const std::string shipped = reports.front().at("shipped");
   json summary;
   for (const json& row : reports.front().at("rows")) {
     std::vector<const json*> same;
@@ -502,26 +499,20 @@ json summarise_quantization(const std::vector<json>& reports) {
     }
     if (same.size() == reports.size()) summary["rows"].push_back(mean_row(same));
   }
-  const auto mean_of = [&](const std::string& name) -> const json& {
-    for (const json& row : summary["rows"]) {
-      if (row.at("name") == name) return row;
-    }
-    throw InputError("quantization: the runs' reports have no row \"" + name + "\" in common");
-  };
-  const json& headline = mean_of(shipped);
-  summary["shipped"] = shipped;
-  summary["psnr_drop_db_mean"] = headline.at("psnr_drop_db");
-  summary["psnr_to_f32_db"] = headline.at("psnr_to_f32_db");
-  summary["difference_psnr_db"] = {{"slow_motion", headline.at("slow_motion_db")}, {"trembling_pose", headline.at("trembling_pose_db")}};
-  summary["ptq"] = mean_of("ptq");
-  if (shipped == "qat") summary["qat"] = headline;
+  for (const char* name : {"ptq", "qat"}) {
+    if (const json* row = find_row(summary, name)) summary[name] = *row;
+  }
+  const json& ptq = summary.at("ptq");
+  summary["psnr_drop_db_mean"] = ptq.at("psnr_drop_db");
+  summary["psnr_to_f32_db"] = ptq.at("psnr_to_f32_db");
+  summary["difference_psnr_db"] = {{"slow_motion", ptq.at("slow_motion_db")}, {"trembling_pose", ptq.at("trembling_pose_db")}};
   const auto worst = std::max_element(reports.begin(), reports.end(), [&](const json& a, const json& b) {
-    return number(*find_row(a, shipped), "psnr_drop_db") < number(*find_row(b, shipped), "psnr_drop_db");
+    return number(*find_row(a, "ptq"), "psnr_drop_db") < number(*find_row(b, "ptq"), "psnr_drop_db");
   });
   summary["worst_member"] = {{"identity", worst->at("identity")},
                              {"run", worst->at("run")},
-                             {"psnr_drop_db", find_row(*worst, shipped)->at("psnr_drop_db")},
-                             {"psnr_to_f32_db", find_row(*worst, shipped)->at("psnr_to_f32_db")}};
+                             {"psnr_drop_db", find_row(*worst, "ptq")->at("psnr_drop_db")},
+                             {"psnr_to_f32_db", find_row(*worst, "ptq")->at("psnr_to_f32_db")}};
   summary["members"] = reports;
   summary["definition"] =
       "PSNR as everywhere: foreground over mid-grey, stored sRGB values, pooled over held-out poses and held-out views; drop: f32 to the "

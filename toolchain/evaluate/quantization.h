@@ -24,7 +24,7 @@ struct QuantizationOptions {
   bool quiet = false;
 };
 
-// One run's report (docs/json.md, "evaluate quantization"). Throws InputError if nothing is held out.
+// One run's report (docs/training.md, "Fixed point"). Throws InputError if nothing is held out.
 nlohmann::json evaluate_quantization(train::TrainedAvatar& avatar, const train::RunDirectory& run, const QuantizationOptions& options);
 
 // Several runs' reports put together: means over the members, worst member named. reports: at least one.

@@ -11,7 +11,7 @@ namespace figurine::quantize {
 
 namespace {
 
-// A pose far outside the training range may double the input before it saturates. One of 15 bits: a step is still 0.07 mm.
+// A pose far outside the training range may double the input before it saturates. One of 15 bits: a step is still 0.06 mm.
 constexpr float kInputHeadroom = 2;
 
 std::vector<size_t> spread_training_frames(const dataset::Dataset& data, uint32_t count) {

@@ -7,6 +7,7 @@
 
 #include "toolchain/error.h"
 #include "toolchain/model/fake_quantisation.h"
+#include "toolchain/model/unet.h"
 #include "toolchain/quantize/range.h"
 
 namespace figurine::quantize {
@@ -110,6 +111,31 @@ FixedPointNetwork QuantisedNetwork::view() const {
   FixedPointNetwork network{.convolutions = {}, .values = scales_.values};
   for (size_t i = 0; i < weights_.size(); ++i) network.convolutions.push_back({weights_[i], scales_.weight_scale[i], bias_[i]});
   return network;
+}
+
+void imitate(const FixedPointNetwork& fixed, model::PoseUNet& unet) {
+  std::vector<float> storage;
+  Network network = unet.export_network(storage);
+  throw_if_error(validate_fixed_point(network, fixed), "network");
+  Scales scales{fixed.values, std::vector<std::vector<float>>(fixed.convolutions.size())};
+  std::vector<std::vector<float>> weights(fixed.convolutions.size()), bias = weights;
+  for (size_t i = 0; i < fixed.convolutions.size(); ++i) {
+    const FixedPointConvolution& convolution = fixed.convolutions[i];
+    if (convolution.weights.empty()) continue;
+    scales.weight_scale[i].assign(convolution.weight_scale.begin(), convolution.weight_scale.end());
+    const size_t per_output = convolution.weights.size() / convolution.bias.size();
+    for (size_t k = 0; k < convolution.weights.size(); ++k) {
+      weights[i].push_back(static_cast<float>(convolution.weights[k]) * convolution.weight_scale[k / per_output]);
+    }
+    const float input_scale = fixed.values[network.layers[i].inputs[0]].scale;
+    for (size_t o = 0; o < convolution.bias.size(); ++o) {
+      bias[i].push_back(static_cast<float>(convolution.bias[o]) * (convolution.weight_scale[o] * input_scale));
+    }
+    network.layers[i].weights = weights[i];
+    network.layers[i].bias = bias[i];
+  }
+  unet.import_network(network);
+  unet.set_fake_quantisation(fake_quantisation(scales));
 }
 
 std::shared_ptr<model::FakeQuantisation> fake_quantisation(const Scales& scales) {

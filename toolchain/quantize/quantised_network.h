@@ -10,7 +10,8 @@
 
 namespace figurine::model {
 struct FakeQuantisation;
-}
+class PoseUNet;
+}  // namespace figurine::model
 
 namespace figurine::quantize {
 
@@ -45,6 +46,10 @@ class QuantisedNetwork {
   std::vector<std::vector<int8_t>> weights_;
   std::vector<std::vector<int32_t>> bias_;
 };
+
+// Makes the UNet imitate a network in fixed point, a package's for example: its weights become the integers' real values. Throws InputError
+// if it is another shape's.
+void imitate(const FixedPointNetwork& fixed, model::PoseUNet& unet);
 
 // The same arithmetic in the trainer's UNet, everything rounded.
 std::shared_ptr<model::FakeQuantisation> fake_quantisation(const Scales& scales);

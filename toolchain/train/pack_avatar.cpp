@@ -168,7 +168,7 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   }
   const PoseFeatures features = pose_features(rotations, avatar.body().joint_count());
   const GoldenView view = choose_golden_view(avatar);
-  const std::vector<std::byte> png = options.golden ? golden_png(avatar, view) : std::vector<std::byte>{};
+  const std::vector<std::byte> png = options.golden && options.float_weights ? golden_png(avatar, view) : std::vector<std::byte>{};
 
   Avatar content{.name = options.name.empty() ? std::filesystem::path(avatar.data().directory()).filename().string() : options.name,
                  .body_name = avatar.body().name,
@@ -187,7 +187,8 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
                             .camera = view.camera,
                             .background = kGoldenBackground,
                             .png = {reinterpret_cast<const uint8_t*>(png.data()), png.size()},
-                            .fixed_point_hash = options.fixed_point_hash}};
+                            .fixed_point_hash = options.fixed_point_hash,
+                            .fixed_point_library = options.fixed_point_library}};
   const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
                                 .macs_per_frame = count_macs(network, shapes),
                                 .gaussians = avatar.body().texel_count()};

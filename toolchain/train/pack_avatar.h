@@ -12,12 +12,13 @@
 namespace figurine::train {
 
 struct PackOptions {
-  std::string name;  // empty: the data folder's name
-  bool golden = true;
+  std::string name;                                // empty: the data folder's name
+  bool golden = true;                              // an expected picture of the float weights
   uint64_t peak_memory_bytes = 0;                  // what the runtime needs for one instance; 0: not known yet
   bool float_weights = true;                       // may be left out if there is fixed_point
   FixedPointNetwork fixed_point;                   // borrowed; empty: none
   std::array<uint64_t, 2> fixed_point_hash{0, 0};  // of the golden frame; zero: not known yet
+  std::string fixed_point_library;                 // that it was made with
   std::vector<KeyValue> settings;                  // behind the run's own in the provenance
   // Licence and consent. Empty fields are filled in for captures of figurine's own (synthetic persons): CC0-1.0, everyone, corporation,
   // "synthetic". For anybody else licence_name and depicted_person have to be given.

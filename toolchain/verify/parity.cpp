@@ -6,6 +6,7 @@
 
 #include "figurine/renderer.h"
 #include "toolchain/error.h"
+#include "toolchain/quantize/quantised_network.h"
 #include "toolchain/train/avatar_model.h"
 
 namespace figurine::verify {
@@ -58,7 +59,8 @@ std::vector<std::pair<size_t, size_t>> choose_views(const dataset::Dataset& data
 
 ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Package& package, const ParityOptions& options) {
   const std::unique_ptr<Renderer> renderer = value_or_throw(Renderer::create({.threads = options.threads}), "runtime");
-  const AvatarId id = value_or_throw(renderer->add_avatar(package, avatar.body_file().package), "runtime");
+  const AvatarId id = value_or_throw(renderer->add_avatar(package, avatar.body_file().package, options.precision), "runtime");
+  if (options.precision == Precision::kFixedPoint) quantize::imitate(package.avatar().fixed_point, avatar.model().unet());
   const dataset::Dataset& data = avatar.data();
   ParityReport report;
   Errors pooled;
@@ -88,16 +90,24 @@ ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Package& p
   return report;
 }
 
-uint64_t measure_memory(const Package& avatar, const Package& body, const PoseView& pose, const Camera& camera) {
-  const std::unique_ptr<Renderer> renderer = value_or_throw(Renderer::create({.threads = 1}), "runtime");
-  const AvatarId id = value_or_throw(renderer->add_avatar(avatar, body), "runtime");
+GoldenRun draw_golden_frame(const Package& avatar, const Package& body) {
+  const GoldenFrame& golden = avatar.avatar().golden;
+  const Camera& camera = golden.camera;
+  GoldenRun run{.library = network_library()};
   std::vector<uint8_t> pixels(size_t(camera.width_px) * camera.height_px * 4);
-  const FrameAvatar seen[] = {{.avatar = id, .pose = pose}};
-  const Frame picture{.camera = camera, .avatars = seen, .gaussians = {}, .background = {}, .splat = {}};
-  throw_if_error(
-      renderer->render(picture, {.pixels = pixels.data(), .stride_bytes = 4 * size_t(camera.width_px), .format = PixelFormat::kRgba8}),
-      "runtime");
-  return renderer->memory_bytes();
+  for (Precision precision : {Precision::kFloat32, Precision::kFixedPoint}) {
+    if (!avatar.avatar().holds(precision)) continue;
+    const std::unique_ptr<Renderer> renderer = value_or_throw(Renderer::create({.threads = 1}), "runtime");
+    const AvatarId id = value_or_throw(renderer->add_avatar(avatar, body, precision), "runtime");
+    const FrameAvatar seen[] = {{.avatar = id, .pose = {golden.root_translation_m, golden.rotations}}};
+    const Frame picture{.camera = camera, .avatars = seen, .gaussians = {}, .background = golden.background, .splat = {}};
+    throw_if_error(
+        renderer->render(picture, {.pixels = pixels.data(), .stride_bytes = 4 * size_t(camera.width_px), .format = PixelFormat::kRgba8}),
+        "runtime");
+    run.memory_bytes = std::max(run.memory_bytes, renderer->memory_bytes());
+    if (precision == Precision::kFixedPoint) run.fixed_point_hash = hash_picture(pixels);
+  }
+  return run;
 }
 
 }  // namespace figurine::verify

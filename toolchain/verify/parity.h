@@ -2,6 +2,7 @@
 // of the toolchain that links the runtime.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -28,12 +29,18 @@ struct ParityReport {
 struct ParityOptions {
   uint32_t views = 12;  // held-out pictures, spread over frames and cameras
   uint32_t threads = 1;
+  Precision precision = Precision::kFloat32;  // in fixed point the trainer's UNet imitates the package's integers
 };
 
-// Throws InputError if the package is not of this run's body, or the runtime refuses it.
+// Throws InputError if the package is not of this run's body, does not hold the precision, or the runtime refuses it.
 ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Package& package, const ParityOptions& options);
 
-// What the runtime holds for one instance of this avatar after a frame of the given view: the package's peak_memory_bytes.
-uint64_t measure_memory(const Package& avatar, const Package& body, const PoseView& pose, const Camera& camera);
+// What a device says of a package: its golden frame drawn by the runtime, in every precision that the package holds.
+struct GoldenRun {
+  uint64_t memory_bytes = 0;                       // of one instance after a frame, in the greedier precision: peak_memory_bytes
+  std::array<uint64_t, 2> fixed_point_hash{0, 0};  // zero without a network in fixed point
+  std::string library;                             // that evaluated it
+};
+GoldenRun draw_golden_frame(const Package& avatar, const Package& body);
 
 }  // namespace figurine::verify
