@@ -16,6 +16,7 @@ if(NOT preset STREQUAL "empty_preset")
   add_test(NAME quick_test COMMAND test ! -e "${CMAKE_SOURCE_DIR}/break-${preset}")
   set_tests_properties(quick_test PROPERTIES LABELS threads)
   add_test(NAME slow_test COMMAND true)
+  set_tests_properties(slow_test PROPERTIES LABELS any_core)
 endif()
 """
 
@@ -30,7 +31,10 @@ class TestScript(unittest.TestCase):
             shutil.copy(ROOT / "scripts" / name, self.root / "scripts" / name)
         for name in ["setup", "format", "check_symbols"]:  # not what is tested here
             self.script(name, "exit 0")
+        self.script("check_golden", '[ "$1" = --list ] && echo host || echo "check_golden: $1: cafe"')
         shutil.copy(ROOT / "CMakePresets.json", self.root)
+        (self.root / "cmake").mkdir()
+        (self.root / "cmake" / "toolchain-aarch64.cmake").touch()
         self.write_project(PROJECT)
 
     def script(self, name, text):
@@ -49,32 +53,35 @@ class TestScript(unittest.TestCase):
     def test_runs_every_preset_and_ends_with_ctests_closing_line(self):
         code, output, errors = self.run_script()
         self.assertEqual(code, 0, output + errors)
-        # dev, asan and scalar run both tests, tsan the one with the label; format and symbols come on top.
-        self.assertEqual(output.strip().splitlines()[-1], "100% tests passed, 0 tests failed out of 9")
-        for name in ["dev/quick_test", "asan/slow_test", "scalar/quick_test", "tsan/quick_test", "format", "release/symbols"]:
+        # dev, asan, scalar and the first ARM core run both tests, tsan and the second core one; format, symbols and golden frames come on top.
+        self.assertEqual(output.strip().splitlines()[-1], "100% tests passed, 0 tests failed out of 13")
+        for name in ["dev/quick_test", "asan/slow_test", "scalar/quick_test", "tsan/quick_test", "format", "release/symbols", "golden/host",
+                     "aarch64-cortex-a76/slow_test", "aarch64-cortex-a53/quick_test"]:
             self.assertIn(name, output)
-        self.assertNotIn("tsan/slow_test", output)
+        for name in ["tsan/slow_test", "aarch64-cortex-a53/slow_test"]:
+            self.assertNotIn(name, output)
+        self.assertIn("golden: host: cafe", errors)
 
     def test_passes_options_on(self):
         code, output, errors = self.run_script("-R", "tsan/")
         self.assertEqual((code, output.strip().splitlines()[-1]), (0, "100% tests passed, 0 tests failed out of 1"), output + errors)
 
     def test_one_broken_test_of_any_preset_is_a_failure(self):
-        for preset in ["dev", "asan", "scalar", "tsan"]:
+        for preset, shown, failures in [("dev", "dev", 1), ("asan", "asan", 1), ("scalar", "scalar", 1), ("tsan", "tsan", 1), ("aarch64", "aarch64-cortex-a53", 2)]:
             with self.subTest(preset=preset):
                 broken = self.root / f"break-{preset}"
                 broken.touch()
                 code, output, _ = self.run_script()
                 broken.unlink()
                 self.assertNotEqual(code, 0)
-                self.assertEqual(output.strip().splitlines()[-1], "89% tests passed, 1 tests failed out of 9")
-                self.assertIn(f"{preset}/quick_test", output)
+                self.assertEqual(output.strip().splitlines()[-1], f"{round(100 - 100 * failures / 13)}% tests passed, {failures} tests failed out of 13")
+                self.assertIn(f"{shown}/quick_test", output)
 
     def test_failing_checks_and_builds_are_failures(self):
         self.script("check_symbols", "exit 1")
         code, output, _ = self.run_script()
         self.assertNotEqual(code, 0)
-        self.assertIn("1 tests failed out of 9", output)
+        self.assertIn("1 tests failed out of 13", output)
         self.write_project(PROJECT + 'add_custom_target(broken ALL COMMAND false)\n')
         code, output, errors = self.run_script()
         self.assertNotEqual(code, 0)
