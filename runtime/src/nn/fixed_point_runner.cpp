@@ -113,9 +113,9 @@ Status FixedPointRunner::prepare(const Network& network, const FixedPointNetwork
   FIG_RETURN_IF_ERROR(prepare_middle(network, fixed, shapes));
   FIG_RETURN_IF_ERROR(prepare_head(network, fixed, use, shapes[network.layers.back().inputs[0]]));
   FIG_RETURN_IF_ERROR(prepare_scratch());
-  // Once for all texels, of an input of zeros: where nothing is drawn, that is the result of every frame.
+  // Of an input of zeros: where nothing is ever drawn, that is the result of every frame.
   for (FirstConvolution& first : first_) {
-    for (uint32_t y = 0; y < size_; ++y) run_first(first, Texels::kAll, y);
+    for (uint32_t y = 0; y < size_; ++y) run_first(first, Texels::kOthers, y);
   }
   constants_ = {};
   return {};
@@ -207,7 +207,7 @@ void FixedPointRunner::run_first(FirstConvolution& first, Texels texels, uint32_
   const uint32_t outputs = first.sums.outputs();
   for (uint32_t x = 0; x < size_; ++x) {
     const size_t texel = size_t{y} * size_ + x;
-    if (texels == Texels::kActive && first.active[texel] == 0) continue;
+    if (first.active[texel] != static_cast<uint8_t>(texels)) continue;
     first.sums.gather(map_, x, y, patch);
     first.sums.sum(patch, x, y, sums);
     requantise_all(sums, first.multiplier.data(), first.zero_point, first.lowest, outputs, first.output.data() + texel * outputs);

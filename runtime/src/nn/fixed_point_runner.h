@@ -68,7 +68,7 @@ class FixedPointRunner {
   Status prepare_scratch();
 
   void quantise_row(uint32_t y);
-  enum class Texels { kAll, kActive };
+  enum class Texels : uint8_t { kOthers, kActive };
   void run_first(FirstConvolution& first, Texels texels, uint32_t y);
   void run_head(size_t chunk);
 
