@@ -6,14 +6,14 @@
 # The person walks (four walks and an endless one from CMU 01_03) and jumps (01_01), turned through 360 degrees. All rows train for
 # iterations, which a busy machine cannot change; the shipped avatar's 11,000 with two views each took 8.3 minutes on one thread.
 #
-# Environment: ITERATIONS (3000) of all rows but the shipped avatar's and its frozen twin's, SEED (56) of the person, IDENTITY (the folder that capture makes of
+# Environment: ITERATIONS (2000) of all rows but the shipped avatar's and its frozen twin's, SEED (56) of the person, IDENTITY (the folder that capture makes of
 # it), ROWS (all) a list of row names to limit training to. On two quiet cores it takes about 30 minutes by estimate.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
 
 folder=${1:-out/line}
-iterations=${ITERATIONS:-3000} seed=${SEED:-56}
+iterations=${ITERATIONS:-2000} seed=${SEED:-56}
 build=build/dev
 started=$SECONDS
 step() { say "line: $((SECONDS - started)) s: $*"; }
@@ -53,17 +53,18 @@ identity=${IDENTITY:-$(cd "$data" && ls -d */ | head -n 1 | tr -d /)}
 # name | options
 rows="
 speed|--iterations 1200
-shipped|--iterations 11000 --views-per-pose 2
-shipped_frozen_pose|--iterations 11000 --views-per-pose 2 --freeze-pose
+shipped|--iterations 7800 --views-per-pose 2
+shipped_frozen_pose|--iterations 7800 --views-per-pose 2 --freeze-pose
 short|--iterations $iterations
 short_frozen_pose|--iterations $iterations --freeze-pose
 short_mean_template|--iterations $iterations --template mean
 short_fourier_off|--iterations $iterations --fourier off
 short_learning_rate_1e-4|--iterations $iterations --learning-rate 1e-4
 short_learning_rate_5e-4|--iterations $iterations --learning-rate 5e-4
+short_background_black|--iterations $iterations --background black
+short_spacing_0.6|--iterations $iterations --spacing-scale 0.6
 short_two_views|--iterations $iterations --views-per-pose 2
 short_warmup_300|--iterations $iterations --warmup 300
-short_spacing_0.45|--iterations $iterations --spacing-scale 0.45
 "
 while IFS='|' read -r name options; do
   [ -n "$name" ] || continue

@@ -26,7 +26,7 @@ constexpr uint32_t kDefaultOctaves = 5;
 struct AvatarArguments {
   std::string data, body, run;
   bool all = false, resume = false, quiet = false;
-  std::optional<std::string> preset, init, template_mode, fourier, precision, background;
+  std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser;
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay;
   std::optional<float> spacing_scale;
@@ -55,6 +55,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   if (arguments.seed) settings.seed = *arguments.seed;
   if (arguments.init) settings.init = *arguments.init;
   if (arguments.learning_rate) settings.schedule.peak = *arguments.learning_rate;
+  if (arguments.optimiser) settings.optimiser = choose(*arguments.optimiser, {train::OptimiserKind::kAdamW, train::OptimiserKind::kMuon});
   if (arguments.weight_decay) settings.weight_decay = *arguments.weight_decay;
   if (arguments.spacing_scale) settings.decoding.spacing_scale = *arguments.spacing_scale;
   if (arguments.warmup) settings.warmup_iterations = *arguments.warmup;
@@ -167,15 +168,19 @@ void add_avatar_command(CLI::App& app) {
                    "Octaves of constant Fourier channels in the input, 1 to 10, or on (5) or off (default: the preset's)")
       ->check(CLI::IsMember({"on", "off"}) | CLI::Range(1, 10));
   command->add_option("--learning-rate", arguments->learning_rate, "Peak of the schedule (default 2e-3)")->check(CLI::PositiveNumber);
-  command->add_option("--weight-decay", arguments->weight_decay, "AdamW's (default 0)")->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--optimiser", arguments->optimiser,
+                   "muon (default): Muon for the kernels of hidden convolutions, AdamW for the rest; adamw: AdamW for all, as in the paper")
+      ->check(CLI::IsMember({"adamw", "muon"}));
+  command->add_option("--weight-decay", arguments->weight_decay, "The optimiser's (default 0)")->check(CLI::NonNegativeNumber);
   command->add_option("--precision", arguments->precision, "Of the convolutions (default auto: bf16 where the CPU has it)")
       ->check(CLI::IsMember({"auto", "f32", "bf16"}));
-  command->add_option("--background", arguments->background, "Behind prediction and truth in the loss")
+  command->add_option("--background", arguments->background, "Behind prediction and truth in the loss (default grey)")
       ->check(CLI::IsMember({"black", "grey", "random"}));
   command->add_option("--views-per-pose", arguments->views, "Images of one pose an iteration (default 1, as in the paper)")
       ->check(CLI::Range(1, 64));
   command
-      ->add_option("--spacing-scale", arguments->spacing_scale, "First radius of a Gaussian, in distances to the next texel (default 0.6)")
+      ->add_option("--spacing-scale", arguments->spacing_scale, "First radius of a Gaussian, in distances to the next texel (default 0.45)")
       ->check(CLI::Range(0.05, 5.0));
   command->add_option("--warmup", arguments->warmup, "Iterations of fitting reference Gaussians first (default 0)");
   command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));

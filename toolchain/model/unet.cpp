@@ -245,6 +245,18 @@ std::vector<uint64_t> PoseUNet::token_lengths() const {
   return lengths;
 }
 
+std::vector<ParameterGroup> PoseUNet::muon_groups() const {
+  const UNetPlan& plan = *impl_->plan;
+  std::vector<ParameterGroup> groups;
+  for (size_t i = 0; i < plan.slots.size(); ++i) {
+    const ConvolutionSlot& slot = plan.slots[i];
+    if (plan.network.layers[i].op != LayerOp::kConv2d) continue;
+    groups.push_back({slot.weights, slot.bias, plan.is_head(i) ? 0 : slot.out});
+    groups.push_back({slot.bias, slot.end(), 0});
+  }
+  return groups;
+}
+
 Network PoseUNet::export_network(std::vector<float>& storage) const {
   const float* flat = impl_->weights.const_data_ptr<float>();
   storage.assign(flat, flat + impl_->plan->parameters);

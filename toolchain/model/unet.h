@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "figurine/network.h"
+#include "toolchain/model/optimiser.h"
 
 namespace figurine::model {
 
@@ -49,6 +50,8 @@ class PoseUNet {
 
   uint64_t parameter_count() const;
   std::vector<uint64_t> token_lengths() const;  // per convolution: kernel + bias
+  // Where Muon and AdamW each update: kernels but the head's are matrices [out, k*k*in].
+  std::vector<ParameterGroup> muon_groups() const;
 
   // The network with weights: spans into `storage`, which is filled with a copy of the flat weights.
   Network export_network(std::vector<float>& storage) const;

@@ -14,7 +14,7 @@
 
 #include "ports/linux/files.h"
 #include "toolchain/error.h"
-#include "toolchain/model/adamw.h"
+#include "toolchain/model/optimiser.h"
 #include "toolchain/model/unet.h"
 
 namespace figurine::train {
@@ -121,19 +121,19 @@ void load_weights(const std::string& path, model::PoseUNet& unet) {
   take_weights(file, read_tensor_file(file), unet);
 }
 
-void save_checkpoint(const RunDirectory& run, const TrainingState& state, const model::PoseUNet& unet, const model::AdamW& optimiser) {
+void save_checkpoint(const RunDirectory& run, const TrainingState& state, const model::PoseUNet& unet, const model::Optimiser& optimiser) {
   TensorFile file;
   add_weights(unet, file);
-  file.tensors["adamw.first_moment"] = named(optimiser.first_moment);
-  file.tensors["adamw.second_moment"] = named(optimiser.second_moment);
+  file.tensors["optimiser.first_moment"] = named(optimiser.first_moment);
+  file.tensors["optimiser.second_moment"] = named(optimiser.second_moment);
   file.metadata["iteration"] = exact(static_cast<double>(state.iteration));
   file.metadata["seconds"] = exact(state.seconds);
-  file.metadata["adamw_steps"] = exact(static_cast<double>(optimiser.steps));
+  file.metadata["optimiser_steps"] = exact(static_cast<double>(optimiser.steps));
   for (const StageField& field : kStageFields) file.metadata[field.name] = exact(state.stages.*field.member);
   write_tensor_file(run.checkpoint(), file);
 }
 
-TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, model::AdamW& optimiser) {
+TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, model::Optimiser& optimiser) {
   const std::string path = run.checkpoint();
   const TensorFile file = read_tensor_file(path);
   TrainingState state;
@@ -141,9 +141,9 @@ TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, mo
   state.seconds = parse_double(path, file.metadata, "seconds");
   for (const StageField& field : kStageFields) state.stages.*field.member = parse_double(path, file.metadata, field.name);
   take_weights(path, file, unet);
-  take_moment(path, file, "adamw.first_moment", optimiser.first_moment);
-  take_moment(path, file, "adamw.second_moment", optimiser.second_moment);
-  optimiser.steps = static_cast<int64_t>(parse_double(path, file.metadata, "adamw_steps"));
+  take_moment(path, file, "optimiser.first_moment", optimiser.first_moment);
+  take_moment(path, file, "optimiser.second_moment", optimiser.second_moment);
+  optimiser.steps = static_cast<int64_t>(parse_double(path, file.metadata, "optimiser_steps"));
   return state;
 }
 

@@ -3,7 +3,7 @@
 //   run.json                 command, settings, data set, body, machine; when done also iterations, seconds and where they went
 //   log.csv                  iteration, seconds, learning rate, loss, PSNR: means of the iterations since the row before
 //   weights.safetensors      the UNet: layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out]
-//   checkpoint.safetensors   the same and what --resume needs: AdamW's moments, iteration, seconds
+//   checkpoint.safetensors   the same and what --resume needs: the optimiser's moments, iteration, seconds
 //   evaluation.json          by figurine-train evaluate reconstruction
 //
 // Every file appears whole or not at all.
@@ -18,7 +18,7 @@
 
 namespace figurine::model {
 class PoseUNet;
-class AdamW;
+class Optimiser;
 }  // namespace figurine::model
 
 namespace figurine::train {
@@ -60,8 +60,8 @@ void save_weights(const RunDirectory& run, const model::PoseUNet& unet);
 // A weights or checkpoint file, or a run folder. Throws InputError naming file and layer if a shape differs.
 void load_weights(const std::string& path, model::PoseUNet& unet);
 
-void save_checkpoint(const RunDirectory& run, const TrainingState& state, const model::PoseUNet& unet, const model::AdamW& optimiser);
-TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, model::AdamW& optimiser);
+void save_checkpoint(const RunDirectory& run, const TrainingState& state, const model::PoseUNet& unet, const model::Optimiser& optimiser);
+TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, model::Optimiser& optimiser);
 
 void save_log(const RunDirectory& run, const std::vector<LogRow>& rows);
 // Rows up to and with `iteration`.

@@ -20,6 +20,7 @@ Enum parse(const std::string& text, const std::array<Enum, N>& values, const std
 }
 
 constexpr std::array kBackgrounds{TrainingBackground::kBlack, TrainingBackground::kGrey, TrainingBackground::kRandom};
+constexpr std::array kOptimisers{OptimiserKind::kAdamW, OptimiserKind::kMuon};
 constexpr std::array kTemplateModes{TemplateMode::kMean, TemplateMode::kShaped};
 
 void require(bool condition, const std::string& where, const char* what) {
@@ -76,6 +77,8 @@ const char* to_string(TrainingBackground background) {
 
 const char* to_string(TemplateMode mode) { return mode == TemplateMode::kMean ? "mean" : "shaped"; }
 
+const char* to_string(OptimiserKind kind) { return kind == OptimiserKind::kMuon ? "muon" : "adamw"; }
+
 nlohmann::json to_json(const TrainSettings& s) {
   return {{"preset", s.preset},
           {"template", to_string(s.template_mode)},
@@ -93,6 +96,7 @@ nlohmann::json to_json(const TrainSettings& s) {
           {"ramp_iterations", s.schedule.ramp_iterations},
           {"learning_rate_floor", s.schedule.floor_fraction},
           {"budget", {{"iterations", s.schedule.budget.iterations}, {"seconds", s.schedule.budget.seconds}}},
+          {"optimiser", to_string(s.optimiser)},
           {"adamw", {{"beta1", s.beta1}, {"beta2", s.beta2}, {"epsilon", s.epsilon}, {"weight_decay", s.weight_decay}}},
           {"precision", s.bf16 ? "bf16" : "f32"},
           {"threads", s.threads},
@@ -124,6 +128,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
                   .floor_fraction = json.at("learning_rate_floor").get<double>(),
                   .budget = {.iterations = json.at("budget").at("iterations").get<uint64_t>(),
                              .seconds = json.at("budget").at("seconds").get<double>()}};
+    s.optimiser = parse(json.value("optimiser", std::string("adamw")), kOptimisers, where + ": optimiser");
     const nlohmann::json& adamw = json.at("adamw");
     s.beta1 = adamw.at("beta1").get<double>();
     s.beta2 = adamw.at("beta2").get<double>();

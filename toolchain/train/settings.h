@@ -25,19 +25,23 @@ inline constexpr std::array<Preset, 3> kPresets{{{"nano", 32, 8, 0, 5}, {"edge",
 // Throws InputError naming the known ones.
 const Preset& find_preset(const std::string& name);
 
-// What lies behind prediction and truth in the loss.
+// What lies behind prediction and truth in the loss. Behind dark clothes black hides every fault of the outline, which grey shows.
 enum class TrainingBackground : uint8_t { kBlack, kGrey, kRandom };
+
+// What updates the kernels of the hidden convolutions; biases and the head are AdamW's either way (toolchain/model/optimiser.h).
+enum class OptimiserKind : uint8_t { kAdamW, kMuon };
 
 struct TrainSettings {
   std::string preset = "edge";
   TemplateMode template_mode = TemplateMode::kShaped;
   bool freeze_pose = false;  // the network sees the rest pose in the true root orientation; the Gaussians are skinned with the true pose
   uint32_t fourier_octaves = 5;
-  HeadDecoding decoding;
+  HeadDecoding decoding{.spacing_scale = 0.45f};
 
   uint64_t seed = 1;  // of the order of the images; initial weights are the same for all avatars (kInitialWeightsSeed, or --init)
   std::string init;   // weights or run to start from; empty: the common initial weights
   Schedule schedule{.peak = 2e-3, .ramp_iterations = 50, .floor_fraction = 0.02, .budget = {.iterations = 0, .seconds = 600}};
+  OptimiserKind optimiser = OptimiserKind::kMuon;
   // AdamW's. An epsilon of 1e-8 would swallow the small gradients of a mean loss.
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-10, weight_decay = 0;
   bool bf16 = false;  // arithmetic of the convolutions while training; weights, head and evaluation are float
@@ -45,7 +49,7 @@ struct TrainSettings {
   uint32_t views_per_pose = 1;  // images of one pose an iteration, sharing one run of the network; the paper's batch is 1
   float ssim_weight = 0.1f;
   float mask_weight = 0.1f;
-  TrainingBackground background = TrainingBackground::kBlack;
+  TrainingBackground background = TrainingBackground::kGrey;
   uint32_t warmup_iterations = 0;    // of fitting reference Gaussians before the first image
   uint32_t crop_margin_px = 16;      // around the box of the true mask
   uint32_t whole_image_period = 16;  // every so many iterations the loss sees the whole image; 0: never
@@ -66,6 +70,7 @@ bool has_fast_bf16();
 
 const char* to_string(TrainingBackground background);
 const char* to_string(TemplateMode mode);
+const char* to_string(OptimiserKind kind);
 
 nlohmann::json to_json(const TrainSettings& settings);
 // Throws InputError "where: FIELD: reason".

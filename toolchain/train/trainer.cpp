@@ -8,9 +8,9 @@
 
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/error.h"
-#include "toolchain/model/adamw.h"
 #include "toolchain/model/allocator.h"
 #include "toolchain/model/loss.h"
+#include "toolchain/model/optimiser.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/package_file.h"
@@ -65,7 +65,7 @@ class Trainer {
         data_(data),
         description_(std::move(description)),
         model_(body.package.body(), data.shape(), settings, settings.bf16),
-        optimiser_(model_.unet().parameter_count(),
+        optimiser_(settings.optimiser == OptimiserKind::kMuon ? model_.unet().muon_groups() : model::adamw_group(model_.unet().parameter_count()),
                    {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {
     model_.unet().set_fake_quantisation(request.fake_quantisation);
   }
@@ -222,7 +222,7 @@ class Trainer {
   const dataset::Dataset& data_;
   nlohmann::json description_;
   AvatarModel model_;
-  model::AdamW optimiser_;
+  model::Optimiser optimiser_;
   torch::Tensor reference_;
   TrainingState state_;
   std::vector<LogRow> rows_;

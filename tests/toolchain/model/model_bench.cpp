@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "tests/toolchain/model/synthetic_body.h"
-#include "toolchain/model/adamw.h"
 #include "toolchain/model/allocator.h"
 #include "toolchain/model/head.h"
 #include "toolchain/model/loss.h"
+#include "toolchain/model/optimiser.h"
 #include "toolchain/model/render.h"
 #include "toolchain/model/splatter.h"
 #include "toolchain/model/ssim.h"
@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
   torch::set_num_threads(static_cast<int>(threads));
   const bool bf16 = argc <= 3 || std::string(argv[3]) == "bf16";
   PoseUNet unet(make_pose_unet(128, 26, 32, head_channels(0)), {.precision = bf16 ? model::Precision::kBfloat16 : model::Precision::kFloat32, .seed = 1});
-  AdamW adamw(unet.parameter_count(), {});
+  Optimiser adamw(adamw_group(unet.parameter_count()), {}), muon(unet.muon_groups(), {});
   AvatarRenderer renderer({.threads = threads});
   const torch::Tensor input = torch::randn({128, 128, 26}), head_weights = torch::randn({128, 128, 14});
   torch::Tensor unet_head;
@@ -94,6 +94,7 @@ int main(int argc, char** argv) {
       {"UNet forward", [&] { unet_head = unet.forward(input); }, {}, {}},
       {"UNet backward", [&] { unet.zero_gradients(), unet_head.backward(head_weights); }, {}, {}},
       {"AdamW", [&] { adamw.step(unet.weights(), unet.gradients(), 1e-5); }, {}, {}},
+      {"Muon", [&] { muon.step(unet.weights(), unet.gradients(), 1e-5); }, {}, {}},
       {"whole iteration", iterate, {}, {}},
   };
   for (int round = 0; round < rounds; ++round) {

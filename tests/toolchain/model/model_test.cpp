@@ -8,8 +8,9 @@
 
 #include "tests/toolchain/model/synthetic_body.h"
 #include "toolchain/error.h"
-#include "toolchain/model/adamw.h"
 #include "toolchain/model/loss.h"
+#include "toolchain/model/muon.h"
+#include "toolchain/model/optimiser.h"
 #include "toolchain/model/render.h"
 #include "toolchain/model/ssim.h"
 #include "toolchain/model/unet.h"
@@ -220,10 +221,10 @@ TEST(PoseUNet, BackwardPassesAddUp) {
   EXPECT_FALSE(unet.gradients().defined());
 }
 
-TEST(AdamW, EqualsItsEquations) {
+TEST(Optimiser, AdamWEqualsItsEquations) {
   constexpr int64_t kCount = 37;
-  const AdamWOptions options{.weight_decay = 0.05};
-  AdamW adamw(kCount, options);
+  const OptimiserOptions options{.weight_decay = 0.05};
+  Optimiser adamw(adamw_group(kCount), options);
   torch::Tensor weights = random_tensor({kCount}, 1);
   std::vector<double> w = to_double(weights), m(kCount), v(kCount);
   double largest = 0;
@@ -242,8 +243,83 @@ TEST(AdamW, EqualsItsEquations) {
   EXPECT_LT(largest, 20 * 0x1p-22);  // twenty steps, each rounds a weight below 4
 }
 
-TEST(AdamW, LeavesWeightsAloneWhenAGradientIsNotFinite) {
-  AdamW adamw(20, {});
+// Newton-Schulz as it is written, on the whole matrix in double.
+torch::Tensor newton_schulz(const torch::Tensor& matrix) {
+  torch::Tensor x = matrix.to(torch::kDouble) / matrix.to(torch::kDouble).norm();
+  for (int i = 0; i < 5; ++i) {
+    const torch::Tensor gram = at::mm(x, x.t());
+    x = x * 3.4445 + at::mm(gram * -4.7750 + at::mm(gram, gram) * 2.0315, x);
+  }
+  return x;
+}
+
+TEST(Muon, OrthogonalisesAsWrittenOnTheWholeMatrix) {
+  double largest = 0;
+  for (const auto& [rows, columns] : {std::pair<int64_t, int64_t>{32, 288}, {8, 8}, {64, 54}, {1, 9}}) {
+    const torch::Tensor matrix = random_tensor({rows, columns}, 7) * 1e-6f;
+    const double error = (orthogonalised(matrix) - newton_schulz(matrix)).abs().max().item<double>();
+    largest = std::max(largest, error);
+  }
+  std::printf("largest error %.3g\n", largest);
+  EXPECT_LT(largest, 1e-5);  // the last product is in float, of up to 64 terms below 2
+}
+
+// A step of equal length along every direction: singular values from a five hundredth of the norm up come out near 1, however unequal.
+TEST(Muon, MakesSingularValuesEqual) {
+  const torch::Tensor u = std::get<0>(at::linalg_qr(random_tensor({32, 32}, 1).to(torch::kDouble))),
+                      v = std::get<0>(at::linalg_qr(random_tensor({288, 32}, 2).to(torch::kDouble)));
+  torch::Tensor singular = torch::logspace(0, -2.5, 32, 10.0, torch::kDouble);
+  const torch::Tensor matrix = at::mm(u * singular, v.t()).to(torch::kFloat);
+  const torch::Tensor found = at::linalg_svdvals(orthogonalised(matrix).to(torch::kDouble));
+  const double least = found.min().item<double>(), most = found.max().item<double>();
+  std::printf("singular values %.3f to %.3f of 1 to 0.003\n", least, most);
+  EXPECT_GT(least, 0.65);
+  EXPECT_LT(most, 1.25);
+}
+
+TEST(Muon, StaysFiniteAtTheEnds) {
+  EXPECT_TRUE(torch::equal(orthogonalised(torch::zeros({4, 9})), torch::zeros({4, 9})));
+  for (const float scale : {1e-38f, 1e-20f, 1e20f, 1e37f}) {
+    torch::Tensor matrix = random_tensor({8, 72}, 3) * scale;
+    EXPECT_TRUE(torch::isfinite(orthogonalised(matrix)).all().item<bool>()) << scale;
+    matrix = torch::zeros({8, 72});
+    matrix[3][5] = scale;  // rank 1
+    const float only = orthogonalised(matrix)[3][5].item<float>();
+    EXPECT_GT(only, 0.65f) << scale;
+    EXPECT_LT(only, 1.25f) << scale;
+  }
+}
+
+TEST(Optimiser, MuonMovesAKernelByItsEquationsAndLeavesTheRestToAdamW) {
+  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)), {.precision = Precision::kFloat32, .seed = 1});
+  const std::vector<ParameterGroup> groups = unet.muon_groups();
+  ASSERT_EQ(groups.size(), 30u);  // kernel and bias of 15 convolutions
+  EXPECT_EQ(groups.back().end, static_cast<int64_t>(unet.parameter_count()));
+  EXPECT_EQ(groups[28].matrix_rows, 0) << "the head";
+  const OptimiserOptions options{.weight_decay = 0.1};
+  Optimiser muon(groups, options), adamw(adamw_group(unet.parameter_count()), options);
+  torch::Tensor weights = unet.weights().detach().clone(), other = weights.clone();
+  const ParameterGroup& kernel = groups[2];
+  const auto matrix = [&](const torch::Tensor& flat) {
+    return flat.narrow(0, kernel.begin, kernel.end - kernel.begin).view({kernel.matrix_rows, -1}).to(torch::kDouble);
+  };
+  torch::Tensor expected = matrix(weights), mean = torch::zeros_like(expected);
+  for (int step = 1; step <= 3; ++step) {
+    const torch::Tensor gradients = random_tensor({weights.numel()}, 40 + step);
+    ASSERT_TRUE(muon.step(weights, gradients, 1e-2));
+    ASSERT_TRUE(adamw.step(other, gradients, 1e-2));
+    mean = 0.95 * mean + 0.05 * matrix(gradients);
+    const torch::Tensor direction = newton_schulz(0.95 * mean + 0.05 * matrix(gradients));
+    expected = expected * (1 - 1e-2 * 0.1) - direction * (1e-2 * 0.2 * std::sqrt(static_cast<double>(expected.size(1))));
+  }
+  EXPECT_LT((matrix(weights) - expected).abs().max().item<double>(), 1e-6);
+  for (const ParameterGroup& group : {groups[3], groups[28], groups[29]}) {
+    EXPECT_TRUE(torch::equal(weights.narrow(0, group.begin, group.end - group.begin), other.narrow(0, group.begin, group.end - group.begin)));
+  }
+}
+
+TEST(Optimiser, LeavesWeightsAloneWhenAGradientIsNotFinite) {
+  Optimiser adamw(adamw_group(20), {});
   torch::Tensor weights = random_tensor({20}, 1), gradients = random_tensor({20}, 2);
   const torch::Tensor before = weights.clone();
   gradients[18] = std::numeric_limits<float>::infinity();
@@ -434,7 +510,7 @@ TEST(Model, LearnsAPictureOfItself) {
       torch::NoGradGuard guard;
       target = renderer.render(teacher.forward(input), scene.frame, scene.view);
     }
-    AdamW adamw(student.parameter_count(), {});
+    Optimiser adamw(adamw_group(student.parameter_count()), {});
     LossTerms terms;
     float first = 0;
     for (int step = 0; step < 80; ++step) {

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "toolchain/error.h"
-#include "toolchain/model/adamw.h"
+#include "toolchain/model/optimiser.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/train/run_directory.h"
 
@@ -88,21 +88,21 @@ TEST_F(RunDirectoryTest, TensorFileNamesWhatIsWrong) {
 TEST_F(RunDirectoryTest, CheckpointRestoresWeightsMomentsAndCounters) {
   const TrainSettings settings = preset_settings("nano");
   model::PoseUNet unet(make_network(settings), {.seed = 3}), other(make_network(settings), {.seed = 4});
-  model::AdamW adamw(unet.parameter_count(), {}), restored(unet.parameter_count(), {});
-  adamw.first_moment.uniform_(-1, 1);
-  adamw.second_moment.uniform_(0, 1);
-  adamw.steps = 123456;
+  model::Optimiser optimiser(unet.muon_groups(), {}), restored(unet.muon_groups(), {});
+  optimiser.first_moment.uniform_(-1, 1);
+  optimiser.second_moment.uniform_(0, 1);
+  optimiser.steps = 123456;
   const RunDirectory run{folder_.string()};
   TrainingState state{.iteration = 123456, .seconds = 1.0 / 3, .stages = {.loss = 0.1}};
-  save_checkpoint(run, state, unet, adamw);
+  save_checkpoint(run, state, unet, optimiser);
   const TrainingState read = load_checkpoint(run, other, restored);
   EXPECT_EQ(read.iteration, state.iteration);
   EXPECT_EQ(read.seconds, state.seconds);
   EXPECT_EQ(read.stages.loss, 0.1);
-  EXPECT_EQ(restored.steps, adamw.steps);
+  EXPECT_EQ(restored.steps, optimiser.steps);
   EXPECT_TRUE(torch::equal(other.weights(), unet.weights()));
-  EXPECT_TRUE(torch::equal(restored.first_moment, adamw.first_moment));
-  EXPECT_TRUE(torch::equal(restored.second_moment, adamw.second_moment));
+  EXPECT_TRUE(torch::equal(restored.first_moment, optimiser.first_moment));
+  EXPECT_TRUE(torch::equal(restored.second_moment, optimiser.second_moment));
 }
 
 TEST_F(RunDirectoryTest, WeightsOfAnotherShapeAreRefusedByName) {
