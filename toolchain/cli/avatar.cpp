@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/train_all.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
@@ -30,9 +31,10 @@ struct AvatarArguments {
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay;
   std::optional<float> spacing_scale;
-  std::optional<uint32_t> warmup, views;
+  std::optional<uint32_t> warmup, views, poses;
   bool freeze_pose = false;
-  uint32_t threads = 0;  // 0: all cores
+  uint32_t threads = 0;  // 0: all cores, with --all one
+  uint32_t slots = 0;    // 0: as many as the threads leave cores for
 };
 
 template <class Enum>
@@ -60,6 +62,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   if (arguments.spacing_scale) settings.decoding.spacing_scale = *arguments.spacing_scale;
   if (arguments.warmup) settings.warmup_iterations = *arguments.warmup;
   if (arguments.views) settings.views_per_pose = *arguments.views;
+  if (arguments.poses) settings.poses_per_iteration = *arguments.poses;
   if (arguments.iterations) settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
   if (arguments.minutes) settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};
   if (arguments.precision) {
@@ -71,7 +74,14 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   }
 }
 
-uint32_t thread_count(uint32_t asked) { return asked > 0 ? asked : std::clamp(std::thread::hardware_concurrency(), 1u, 16u); }
+uint32_t core_count() { return std::clamp(std::thread::hardware_concurrency(), 1u, 16u); }
+
+// Two one-thread trainings on two cores do more than one of two threads after the other (docs/training.md).
+uint32_t thread_count(const AvatarArguments& arguments) { return arguments.threads > 0 ? arguments.threads : arguments.all ? 1 : core_count(); }
+
+uint32_t slot_count(const AvatarArguments& arguments) {
+  return arguments.slots > 0 ? arguments.slots : std::max(1u, core_count() / thread_count(arguments));
+}
 
 train::TrainRequest make_request(const AvatarArguments& arguments, const std::string& data, const std::string& run) {
   train::TrainRequest request{.data = data,
@@ -102,13 +112,13 @@ train::TrainRequest make_request(const AvatarArguments& arguments, const std::st
     request.settings.bf16 = train::has_fast_bf16();
     overlay(arguments, request.settings);
   }
-  request.settings.threads = thread_count(arguments.threads);
+  request.settings.threads = thread_count(arguments);
   return request;
 }
 
-void train_one(const AvatarArguments& arguments, const std::string& data, const std::string& run) {
-  const train::TrainRequest request = make_request(arguments, data, run);
-  const train::TrainResult result = train::train_avatar(request);
+void train_one(const AvatarArguments& arguments) {
+  const std::string& run = arguments.run;
+  const train::TrainResult result = train::train_avatar(make_request(arguments, arguments.data, run));
   if (arguments.quiet) return;
   if (result.was_finished) {
     std::printf("%s: was finished already (%llu iterations)\n", run.c_str(), static_cast<unsigned long long>(result.state.iteration));
@@ -119,27 +129,6 @@ void train_one(const AvatarArguments& arguments, const std::string& data, const 
               static_cast<double>(result.state.iteration) / std::max(1e-9, result.state.seconds), result.psnr_db);
 }
 
-void train_all(const AvatarArguments& arguments) {
-  std::vector<std::string> identities;
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(arguments.data, error)) {
-    if (entry.is_directory() && fs::exists(entry.path() / "images_lr")) identities.push_back(entry.path().filename().string());
-  }
-  if (error) throw InputError(arguments.data + ": " + error.message());
-  if (identities.empty()) throw InputError(arguments.data + ": holds no identity (a folder with images_lr in it)");
-  std::sort(identities.begin(), identities.end());
-  size_t failed = 0;
-  for (const std::string& identity : identities) {
-    try {
-      train_one(arguments, arguments.data + "/" + identity, arguments.run + "/" + identity);
-    } catch (const InputError& problem) {
-      ++failed;
-      std::fprintf(stderr, "figurine-train: %s: %s\n", identity.c_str(), problem.what());
-    }
-  }
-  if (failed > 0) throw InputError(std::to_string(failed) + " of " + std::to_string(identities.size()) + " identities failed");
-}
-
 }  // namespace
 
 void add_avatar_command(CLI::App& app) {
@@ -148,7 +137,7 @@ void add_avatar_command(CLI::App& app) {
   command->add_option("--data", arguments->data, "Folder of one identity (with --all: of identities)");
   command->add_option("--body", arguments->body, "Body package (figurine-train body)");
   command->add_option("-o,--output", arguments->run, "Folder of the run (with --all: of runs)")->required();
-  command->add_flag("--all", arguments->all, "Every identity of the folder, one after the other");
+  command->add_flag("--all", arguments->all, "Every identity of the folder; one that fails does not stop the others");
   command->add_flag("--resume", arguments->resume, "Go on from the last checkpoint, by the run's own settings");
   command->add_flag("--quiet", arguments->quiet, "No progress, no summary");
   command->add_option("--preset", arguments->preset, "Size of the network (default edge)")->check(CLI::IsMember({"nano", "edge", "paper"}));
@@ -179,17 +168,27 @@ void add_avatar_command(CLI::App& app) {
       ->check(CLI::IsMember({"black", "grey", "random"}));
   command->add_option("--views-per-pose", arguments->views, "Images of one pose an iteration (default 1, as in the paper)")
       ->check(CLI::Range(1, 64));
+  command->add_option("--poses", arguments->poses, "Poses an iteration, side by side on threads of their own (default 1)")->check(CLI::Range(1, 64));
   command
       ->add_option("--spacing-scale", arguments->spacing_scale, "First radius of a Gaussian, in distances to the next texel (default 0.45)")
       ->check(CLI::Range(0.05, 5.0));
   command->add_option("--warmup", arguments->warmup, "Iterations of fitting reference Gaussians first (default 0)");
-  command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->add_option("--threads", arguments->threads, "Of a training (default: all cores; with --all: 1)")->check(CLI::Range(1, 256));
+  command->add_option("--slots", arguments->slots, "With --all: trainings at a time, each in its own process (default: cores / threads)")
+      ->check(CLI::Range(1, 256));
   command->callback([arguments] {
     if (arguments->all) {
       if (arguments->data.empty()) throw InputError("--all needs --data");
-      train_all(*arguments);
+      const auto request_of = [&](const std::string& identity) {
+        return make_request(*arguments, arguments->data + "/" + identity, arguments->run + "/" + identity);
+      };
+      train_all({.data = arguments->data,
+                 .runs = arguments->run,
+                 .slots = slot_count(*arguments),
+                 .quiet = arguments->quiet},
+                request_of);
     } else {
-      train_one(*arguments, arguments->data, arguments->run);
+      train_one(*arguments);
     }
   });
 }

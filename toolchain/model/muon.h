@@ -14,7 +14,7 @@
 namespace figurine::model {
 
 // matrix: [rows, columns] float; cheapest with rows <= columns. Returns U f(S) V' of its singular value decomposition U S V', where f maps
-// what is not below a thousandth of S's Frobenius norm to 0.68 to 1.13; zeros for a matrix of zeros.
+// every singular value down to a five hundredth of the Frobenius norm to between 0.68 and 1.2; zeros for a matrix of zeros.
 torch::Tensor orthogonalised(const torch::Tensor& matrix);
 
 }  // namespace figurine::model

@@ -234,6 +234,11 @@ torch::Tensor& PoseUNet::weights() { return impl_->weights; }
 torch::Tensor& PoseUNet::gradients() { return impl_->weights.mutable_grad(); }
 void PoseUNet::zero_gradients() { impl_->weights.mutable_grad() = torch::Tensor(); }
 
+void PoseUNet::share_weights(const PoseUNet& other) {
+  TORCH_CHECK(impl_->weights.numel() == other.impl_->weights.numel(), "PoseUNet: weights of another shape");
+  impl_->weights = other.impl_->weights.detach().requires_grad_();
+}
+
 uint64_t PoseUNet::parameter_count() const { return static_cast<uint64_t>(impl_->plan->parameters); }
 
 std::vector<uint64_t> PoseUNet::token_lengths() const {

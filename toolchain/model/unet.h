@@ -48,6 +48,9 @@ class PoseUNet {
   torch::Tensor& gradients();  // [P] flat float; backward passes add to it, undefined before the first
   void zero_gradients();
 
+  // From now on this UNet's weights are the other's, in the same memory; gradients stay its own. Throws if the shapes differ.
+  void share_weights(const PoseUNet& other);
+
   uint64_t parameter_count() const;
   std::vector<uint64_t> token_lengths() const;  // per convolution: kernel + bias
   // Where Muon and AdamW each update: kernels but the head's are matrices [out, k*k*in].

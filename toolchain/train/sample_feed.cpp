@@ -9,7 +9,7 @@ namespace figurine::train {
 
 namespace {
 
-constexpr size_t kAhead = 3;                        // samples prepared before they are asked for
+constexpr size_t kAhead = 4;                        // samples prepared before they are asked for
 constexpr size_t kMaxImageBytes = size_t{4} << 30;  // of cached crops
 constexpr uint64_t kBackgroundStream = 0x6267;
 
@@ -72,12 +72,12 @@ torch::Tensor target_of(const CroppedImage& image, const model::PixelRect& rect)
   return target;
 }
 
-SampleFeed::SampleFeed(const dataset::Dataset& data, const AvatarModel& model, uint64_t first_iteration)
+SampleFeed::SampleFeed(const dataset::Dataset& data, const AvatarModel& model, uint64_t first_sample)
     : data_(data),
       model_(model),
       pairs_(training_pairs(data)),
       order_(model.settings().seed, pairs_.size()),
-      next_iteration_(first_iteration),
+      next_sample_(first_sample),
       worker_([this] { work(); }) {}
 
 SampleFeed::~SampleFeed() {
@@ -108,7 +108,7 @@ void SampleFeed::work() {
       if (stop_) return;
     }
     try {
-      Sample sample = prepare(next_iteration_++);
+      Sample sample = prepare(next_sample_++);
       const std::lock_guard lock(mutex_);
       ready_.push_back(std::move(sample));
     } catch (...) {
@@ -131,13 +131,13 @@ std::shared_ptr<const CroppedImage> SampleFeed::image(size_t pair) {
   return crop;
 }
 
-SampleView SampleFeed::prepare_view(uint64_t iteration, size_t pair) {
+SampleView SampleFeed::prepare_view(uint64_t number, size_t pair) {
   const TrainSettings& settings = model_.settings();
   const size_t camera = pairs_[pair].second;
   const std::shared_ptr<const CroppedImage> truth = image(pair);
   SampleView view{.camera = camera, .view = {.camera = data_.cameras()[camera].camera, .crop = truth->rect}, .target = {}};
   // Gaussians could hide from the loss outside the crop: now and then it looks at the whole image.
-  if (settings.whole_image_period > 0 && iteration % settings.whole_image_period == settings.whole_image_period - 1) {
+  if (settings.whole_image_period > 0 && number % settings.whole_image_period == settings.whole_image_period - 1) {
     view.view.crop = {0, 0, view.view.camera.width_px, view.view.camera.height_px};
     view.loss_scale = float(view.view.crop.width) * float(view.view.crop.height) / (float(truth->rect.width) * float(truth->rect.height));
   }
@@ -145,10 +145,10 @@ SampleView SampleFeed::prepare_view(uint64_t iteration, size_t pair) {
   return view;
 }
 
-Sample SampleFeed::prepare(uint64_t iteration) {
+Sample SampleFeed::prepare(uint64_t number) {
   const TrainSettings& settings = model_.settings();
-  const size_t pair = order_.item(iteration), frame = pairs_[pair].first;
-  Sample sample{.iteration = iteration, .frame = frame, .posed = {}, .views = {}};
+  const size_t pair = order_.item(number), frame = pairs_[pair].first;
+  Sample sample{.number = number, .frame = frame, .posed = {}, .views = {}};
   // Further views of the same pose are spread over its cameras, so that they show different sides of the person.
   const auto of_other_frame = [&](const std::pair<size_t, size_t>& other) { return other.first != frame; };
   const auto here = pairs_.begin() + static_cast<std::ptrdiff_t>(pair);
@@ -156,7 +156,7 @@ Sample SampleFeed::prepare(uint64_t iteration) {
       static_cast<size_t>(std::find_if(std::make_reverse_iterator(here), pairs_.rend(), of_other_frame).base() - pairs_.begin());
   const size_t count = static_cast<size_t>(std::find_if(here, pairs_.end(), of_other_frame) - pairs_.begin()) - first;
   const size_t views = std::min<size_t>(settings.views_per_pose, count);
-  for (size_t v = 0; v < views; ++v) sample.views.push_back(prepare_view(iteration, first + (pair - first + v * count / views) % count));
+  for (size_t v = 0; v < views; ++v) sample.views.push_back(prepare_view(number, first + (pair - first + v * count / views) % count));
   sample.posed = model_.pose(model_.from_capture(data_.frames()[frame]).view());
   switch (settings.background) {
     case TrainingBackground::kBlack:
@@ -165,7 +165,7 @@ Sample SampleFeed::prepare(uint64_t iteration) {
       sample.background = {0.5f, 0.5f, 0.5f};
       break;
     case TrainingBackground::kRandom:
-      for (uint64_t c = 0; c < 3; ++c) sample.background[c] = random_unit(settings.seed, kBackgroundStream, 3 * iteration + c);
+      for (uint64_t c = 0; c < 3; ++c) sample.background[c] = random_unit(settings.seed, kBackgroundStream, 3 * number + c);
       break;
   }
   return sample;

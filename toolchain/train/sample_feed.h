@@ -1,7 +1,7 @@
-// What the training loop eats: for every iteration one training pose with its UNet input, and one or more images of it, cropped; prepared
-// on a thread of its own, a few iterations ahead.
+// What the training loop eats: samples, each one training pose with its UNet input, and one or more images of it, cropped; prepared on a
+// thread of its own, a few samples ahead.
 //
-// Which images an iteration gets depends on (seed, iteration) alone. Images are decoded at their first use and kept as 8-bit crops around
+// Which images a sample has depends on (seed, its number) alone. Images are decoded at their first use and kept as 8-bit crops around
 // the mask (about 0.3 MB at 512x512), up to a limit; past it they are decoded again.
 #pragma once
 
@@ -30,7 +30,7 @@ struct SampleView {
 };
 
 struct Sample {
-  uint64_t iteration = 0;
+  uint64_t number = 0;  // counted from the start of the training
   size_t frame = 0;  // of the data set's list
   PosedBody posed;
   std::vector<SampleView> views;  // of that frame, the shuffled order's own first
@@ -51,19 +51,19 @@ torch::Tensor target_of(const CroppedImage& image, const model::PixelRect& rect)
 class SampleFeed {
  public:
   // data and model are borrowed. Throws InputError if there is no training image.
-  SampleFeed(const dataset::Dataset& data, const AvatarModel& model, uint64_t first_iteration);
+  SampleFeed(const dataset::Dataset& data, const AvatarModel& model, uint64_t first_sample);
   ~SampleFeed();
   SampleFeed(const SampleFeed&) = delete;
   SampleFeed& operator=(const SampleFeed&) = delete;
 
-  // Samples of first_iteration, first_iteration + 1, ... Rethrows what went wrong while preparing (InputError on a damaged image).
+  // Samples first_sample, first_sample + 1, ... Rethrows what went wrong while preparing (InputError on a damaged image).
   Sample next();
 
   size_t image_count() const { return pairs_.size(); }
 
  private:
-  Sample prepare(uint64_t iteration);
-  SampleView prepare_view(uint64_t iteration, size_t pair);
+  Sample prepare(uint64_t number);
+  SampleView prepare_view(uint64_t number, size_t pair);
   std::shared_ptr<const CroppedImage> image(size_t pair);
   void work();
 
@@ -79,7 +79,7 @@ class SampleFeed {
   std::deque<Sample> ready_;
   std::exception_ptr error_;
   bool stop_ = false;
-  uint64_t next_iteration_;
+  uint64_t next_sample_;
   std::thread worker_;  // last: everything above exists before it starts
 };
 

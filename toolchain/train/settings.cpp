@@ -101,6 +101,7 @@ nlohmann::json to_json(const TrainSettings& s) {
           {"precision", s.bf16 ? "bf16" : "f32"},
           {"threads", s.threads},
           {"views_per_pose", s.views_per_pose},
+          {"poses_per_iteration", s.poses_per_iteration},
           {"loss", {{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}, {"lpips", 0.0}}},
           {"background", to_string(s.background)},
           {"warmup_iterations", s.warmup_iterations},
@@ -139,6 +140,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     s.bf16 = precision == "bf16";
     s.threads = json.at("threads").get<uint32_t>();
     s.views_per_pose = json.value("views_per_pose", 1u);
+    s.poses_per_iteration = json.value("poses_per_iteration", 1u);
     s.ssim_weight = json.at("loss").at("ssim").get<float>();
     s.mask_weight = json.at("loss").at("mask").get<float>();
     s.background = parse(json.at("background").get<std::string>(), kBackgrounds, where + ": background");
@@ -157,6 +159,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
   require(s.schedule.peak > 0 && std::isfinite(s.schedule.peak), where, "learning_rate: must be positive and finite");
   require((s.schedule.budget.iterations > 0) != (s.schedule.budget.seconds > 0), where, "budget: iterations or seconds, one of both");
   require(s.views_per_pose >= 1 && s.views_per_pose <= 64, where, "views_per_pose: must be 1 to 64");
+  require(s.poses_per_iteration >= 1 && s.poses_per_iteration <= 64, where, "poses_per_iteration: must be 1 to 64");
   require(s.threads >= 1 && s.threads <= 256, where, "threads: must be 1 to 256");
   return s;
 }

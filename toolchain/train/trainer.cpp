@@ -13,6 +13,7 @@
 #include "toolchain/model/optimiser.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/interrupt.h"
+#include "toolchain/train/lanes.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/train/reference_gaussians.h"
@@ -55,6 +56,19 @@ struct IterationResult {
   uint64_t foreground = 0;
 };
 
+// What one pose of an iteration gave.
+struct PoseResult {
+  IterationResult result;
+  torch::Tensor gradients;  // [P]
+  StageSeconds stages;
+};
+
+// Never more lanes than threads: poses beyond them wait for their turn.
+unsigned lane_count(const TrainSettings& settings) { return std::min(settings.poses_per_iteration, settings.threads); }
+
+// LibTorch's number of threads inside an operation belongs to the thread that calls it.
+void use_lane_threads(const TrainSettings& settings) { at::set_num_threads(static_cast<int>(settings.threads / lane_count(settings))); }
+
 class Trainer {
  public:
   Trainer(const TrainRequest& request, const TrainSettings& settings, const PackageFile& body, const dataset::Dataset& data,
@@ -64,15 +78,19 @@ class Trainer {
         run_{request.run},
         data_(data),
         description_(std::move(description)),
-        model_(body.package.body(), data.shape(), settings, settings.bf16),
+        model_(body.package.body(), data.shape(), lane_settings(), settings.bf16),
         optimiser_(settings.optimiser == OptimiserKind::kMuon ? model_.unet().muon_groups() : model::adamw_group(model_.unet().parameter_count()),
                    {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {
-    model_.unet().set_fake_quantisation(request.fake_quantisation);
+    for (unsigned lane = 1; lane < lane_count(settings_); ++lane) {
+      replicas_.push_back(std::make_unique<AvatarModel>(body.package.body(), data.shape(), lane_settings(), settings.bf16));
+      replicas_.back()->unet().share_weights(model_.unet());
+    }
+    for (unsigned lane = 0; lane < lane_count(settings_); ++lane) model_of(lane).unet().set_fake_quantisation(request.fake_quantisation);
   }
 
   TrainResult run() {
     start();
-    SampleFeed feed(data_, model_, state_.iteration);
+    SampleFeed feed(data_, model_, state_.iteration * settings_.poses_per_iteration);
     Progress progress(std::filesystem::path(request_.data).filename().string(), request_.quiet);
     const InterruptGuard interrupt;
     double last_checkpoint = now_s();
@@ -110,6 +128,15 @@ class Trainer {
   }
 
  private:
+  // A lane's renderer and loss have that lane's share of the threads.
+  TrainSettings lane_settings() const {
+    TrainSettings settings = settings_;
+    settings.threads /= lane_count(settings_);
+    return settings;
+  }
+
+  AvatarModel& model_of(unsigned lane) { return lane == 0 ? model_ : *replicas_[lane - 1]; }
+
   void start() {
     if (request_.resume && std::filesystem::exists(run_.checkpoint())) {
       state_ = load_checkpoint(run_, model_.unet(), optimiser_);
@@ -123,55 +150,88 @@ class Trainer {
 
   IterationResult iterate(SampleFeed& feed, double rate) {
     StageClock clock;
-    const Sample sample = feed.next();
+    const uint32_t count = settings_.poses_per_iteration, lanes = lane_count(settings_);
+    std::vector<Sample> samples;
+    for (uint32_t i = 0; i < count; ++i) samples.push_back(feed.next());
     clock.add(state_.stages.data);
-    model_.unet().zero_gradients();
-    const torch::Tensor head = model_.unet().forward(sample.posed.input);
-    clock.add(state_.stages.unet_forward);
+    std::vector<PoseResult> poses(count);
+    lanes_.run([&](unsigned lane) {
+      for (uint32_t i = lane; i < count; i += lanes) poses[i] = pose_iteration(samples[i], model_of(lane));
+    });
+    for (size_t i = 0; i < count; i += lanes) add_stages(poses[i].stages);
+    StageClock last;
     IterationResult result;
-    if (sample.iteration < settings_.warmup_iterations) {
-      const torch::Tensor loss = reference_loss(head, reference_, model_.body());
-      result.loss = loss.item<double>();
-      loss.backward();
-      clock.add(state_.stages.unet_backward);
-    } else {
-      result = image_iteration(sample, head, clock);
+    // In the order of the poses, whatever thread they ran on.
+    torch::Tensor gradients = poses[0].gradients;
+    for (uint32_t i = 0; i < count; ++i) {
+      if (!std::isfinite(poses[i].result.loss)) fail(samples[i], "the loss is not finite");
+      if (i > 0) gradients.add_(poses[i].gradients);
+      result.loss += poses[i].result.loss / count;
+      result.squared_error += poses[i].result.squared_error;
+      result.foreground += poses[i].result.foreground;
     }
-    if (!std::isfinite(result.loss)) fail(sample, "the loss is not finite");
-    if (!optimiser_.step(model_.unet().weights(), model_.unet().gradients(), rate)) fail(sample, "a gradient is not finite");
-    clock.add(state_.stages.optimiser);
+    if (count > 1) gradients.mul_(1.0 / count);
+    if (!optimiser_.step(model_.unet().weights(), gradients, rate)) fail(samples[0], "a gradient is not finite");
+    last.add(state_.stages.optimiser);
     return result;
+  }
+
+  // Stages of lane 0; the others' run beside them.
+  void add_stages(const StageSeconds& stages) {
+    StageSeconds& sum = state_.stages;
+    sum.unet_forward += stages.unet_forward, sum.unet_backward += stages.unet_backward;
+    sum.splat_forward += stages.splat_forward, sum.splat_backward += stages.splat_backward;
+    sum.loss += stages.loss;
+  }
+
+  PoseResult pose_iteration(const Sample& sample, AvatarModel& model) const {
+    StageClock clock;
+    PoseResult pose;
+    model.unet().zero_gradients();
+    const torch::Tensor head = model.unet().forward(sample.posed.input);
+    clock.add(pose.stages.unet_forward);
+    if (sample.number / settings_.poses_per_iteration < settings_.warmup_iterations) {
+      const torch::Tensor loss = reference_loss(head, reference_, model.body());
+      pose.result.loss = loss.item<double>();
+      loss.backward();
+      clock.add(pose.stages.unet_backward);
+    } else {
+      pose.result = image_iteration(sample, head, model, clock, pose.stages);
+    }
+    pose.gradients = model.unet().gradients();
+    return pose;
   }
 
   // The graph is cut at the head and at the pictures, so that each part's backward pass can be timed and the views of a pose can share one
   // run of the network. Gradients are those of the mean loss of the views.
-  IterationResult image_iteration(const Sample& sample, const torch::Tensor& head, StageClock& clock) {
+  IterationResult image_iteration(const Sample& sample, const torch::Tensor& head, AvatarModel& model, StageClock& clock,
+                                  StageSeconds& stages) const {
     const torch::Tensor head_leaf = head.detach().requires_grad_();
     const double share = 1.0 / static_cast<double>(sample.views.size());
     IterationResult result;
     for (const SampleView& view : sample.views) {
-      const torch::Tensor image = model_.renderer().render(head_leaf, model_.head_frame(sample.posed), view.view);
-      clock.add(state_.stages.splat_forward);
+      const torch::Tensor image = model.renderer().render(head_leaf, model.head_frame(sample.posed), view.view);
+      clock.add(stages.splat_forward);
       const torch::Tensor image_leaf = image.detach().requires_grad_();
       model::LossTerms terms;
       const torch::Tensor loss = model::image_loss(
           image_leaf, view.target, sample.background,
-          {.ssim_weight = settings_.ssim_weight, .mask_weight = settings_.mask_weight, .threads = settings_.threads}, &terms);
+          {.ssim_weight = settings_.ssim_weight, .mask_weight = settings_.mask_weight, .threads = model.settings().threads}, &terms);
       (loss * (view.loss_scale * share)).backward();
-      clock.add(state_.stages.loss);
+      clock.add(stages.loss);
       image.backward(image_leaf.grad());
-      clock.add(state_.stages.splat_backward);
+      clock.add(stages.splat_backward);
       result.loss += terms.total * view.loss_scale * share;
       result.squared_error += terms.squared_error;
       result.foreground += terms.foreground;
     }
     head.backward(head_leaf.grad());
-    clock.add(state_.stages.unet_backward);
+    clock.add(stages.unet_backward);
     return result;
   }
 
   [[noreturn]] void fail(const Sample& sample, const char* what) const {
-    throw InputError(run_.path + ": iteration " + std::to_string(sample.iteration) + " (" +
+    throw InputError(run_.path + ": iteration " + std::to_string(sample.number / settings_.poses_per_iteration) + " (" +
                      data_.image_path(sample.frame, sample.views.front().camera) + "): " + what + "; the last checkpoint is kept");
   }
 
@@ -222,6 +282,8 @@ class Trainer {
   const dataset::Dataset& data_;
   nlohmann::json description_;
   AvatarModel model_;
+  std::vector<std::unique_ptr<AvatarModel>> replicas_;  // of lanes 1..; their weights are model_'s
+  Lanes lanes_{lane_count(settings_), [settings = settings_] { use_lane_threads(settings); }};
   model::Optimiser optimiser_;
   torch::Tensor reference_;
   TrainingState state_;
@@ -315,7 +377,7 @@ TrainResult train_avatar(const TrainRequest& request) {
     std::filesystem::create_directories(request.run, error);
     if (error) throw InputError(request.run + ": cannot be created: " + error.message());
   }
-  at::set_num_threads(static_cast<int>(settings.threads));
+  use_lane_threads(settings);
   model::keep_freed_memory();
   return Trainer(request, settings, body, data, std::move(description)).run();
 }
