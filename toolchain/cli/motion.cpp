@@ -9,6 +9,7 @@
 #include "toolchain/body/motion_loop.h"
 #include "toolchain/body/retarget.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/glb_source.h"
 #include "toolchain/error.h"
 
 namespace figurine::cli {
@@ -22,7 +23,7 @@ struct MotionOptions {
   std::string source;
   uint32_t start = 0;
   uint32_t frames = 0;
-  std::string neutral = "first";
+  std::string neutral;
   std::string up = "z";
   uint32_t loop_cycles = 0;
   bool in_place = false;
@@ -44,7 +45,9 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   if (retarget.name.empty()) retarget.name = path.stem().string();
   if (has_start) retarget.start = options.start;
   if (has_frames) retarget.frames = options.frames;
-  retarget.neutral = options.neutral == "zero" ? body::Neutral::kZeroPose : body::Neutral::kFirstFrame;
+  if (options.neutral == "first") retarget.neutral = body::Neutral::kFirstFrame;
+  if (options.neutral == "zero") retarget.neutral = body::Neutral::kZeroPose;
+  if (options.neutral == "axes") retarget.neutral = body::Neutral::kBoneAxes;
   retarget.z_up = options.up == "z";
 
   body::RetargetReport report;
@@ -54,9 +57,9 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   } else if (extension == ".npz") {
     clip = body::retarget_npz(options.clip, package.body(), retarget, &report);
   } else if (extension == ".glb") {
-    throw InputError(options.clip + ": unsupported: .glb animations are not read by this version; use .bvh or .npz");
+    clip = body::retarget_glb(options.clip, package.body(), retarget, &report);
   } else {
-    throw InputError(options.clip + ": unsupported: the name must end in .bvh or .npz");
+    throw InputError(options.clip + ": unsupported: the name must end in .bvh, .npz or .glb");
   }
 
   if (options.loop_cycles > 0) {
@@ -73,11 +76,14 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
                          {"start", has_start ? std::to_string(options.start) : "first of the motion"},
                          {"frames", std::to_string(clip.frame_count)},
                          {"loop_cycles", std::to_string(options.loop_cycles)},
-                         {"smooth_s", std::to_string(retarget.smooth_s)}};
+                         {"smooth_s", std::to_string(retarget.smooth_s.value_or(extension == ".glb" ? 0 : body::kCaptureSmoothS))}};
+  if (extension == ".glb") provenance.settings.push_back({"animation", std::to_string(retarget.animation)});
   if (!options.source.empty()) {
     provenance.sources = {options.source};
   } else if (extension == ".bvh") {
     provenance.sources = {path.filename().string() + ": " + kCmuSource};
+  } else if (extension == ".glb") {
+    provenance.sources = {glb_source(options.clip)};
   } else {
     provenance.sources = {path.filename().string() + ": supplied by the user"};
   }
@@ -95,20 +101,27 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
 
 void add_motion_command(CLI::App& app) {
   auto options = std::make_shared<MotionOptions>();
-  CLI::App* command = app.add_subcommand("motion", "Move a captured clip (.bvh, .npz) onto a body");
-  command->add_option("clip", options->clip, "CLIP.bvh with CMU's joint names, or an AMASS-style CLIP.npz")->required();
+  CLI::App* command = app.add_subcommand("motion", "Move a captured clip (.bvh, .npz, .glb) onto a body");
+  command
+      ->add_option("clip", options->clip,
+                   "CLIP.bvh with CMU's joint names, an AMASS-style CLIP.npz, or a glTF CLIP.glb with HumanIK's joint names")
+      ->required();
   command->add_option("--body", options->body, "BODY.fgn")->required();
   command->add_option("-o,--output", options->output, "MOTION.fgn")->required();
   command->add_option("--fps", options->retarget.frames_per_second, "Frames a second of the result")->check(CLI::Range(1.0, 240.0));
-  const CLI::Option* start =
-      command->add_option("--start", options->start, "First frame of the clip, counted as in the file; default: after the neutral frame");
+  const CLI::Option* start = command->add_option(
+      "--start", options->start, "First frame of the clip, counted as in the file (GLB: at --fps); default: after the neutral frame");
   const CLI::Option* frames =
       command->add_option("--frames", options->frames, "Frames of the result; default: to the end")->check(CLI::PositiveNumber);
   command->add_option("--name", options->retarget.name, "Name of the motion; default: the file's");
-  command->add_option("--smooth", options->retarget.smooth_s, "Standard deviation of the smoothing over time, seconds")
+  command
+      ->add_option("--smooth", options->retarget.smooth_s, "Standard deviation of the smoothing over time, seconds; default: 0.03, GLB: 0")
       ->check(CLI::Range(0.0, 0.5));
-  command->add_option("--neutral", options->neutral, "BVH: the T-pose is the first frame or the zero pose")
-      ->check(CLI::IsMember({"first", "zero"}));
+  command
+      ->add_option("--neutral", options->neutral,
+                   "The T-pose is the first frame (default of BVH), the zero pose, or told by the bones' axes (default of GLB)")
+      ->check(CLI::IsMember({"first", "zero", "axes"}));
+  command->add_option("--animation", options->retarget.animation, "GLB: which of the file's animations, counted from 0");
   command->add_option("--up", options->up, "NPZ: the world's up axis")->check(CLI::IsMember({"z", "y"}));
   CLI::Option* loop = command->add_option("--loop", options->loop_cycles, "Repeat the best gait cycle this often, straight ahead")
                           ->check(CLI::Range(1u, 1000u));

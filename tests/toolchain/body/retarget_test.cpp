@@ -11,12 +11,15 @@
 #include "ports/linux/files.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/motion_loop.h"
+#include "toolchain/body/posed_joints.h"
 #include "toolchain/body/test_files.h"
 #include "toolchain/body/texel_body.h"
 
 namespace figurine::body {
 namespace {
 
+using test::direction;
+using test::joints_of;
 using Vec3 = Eigen::Vector3f;
 
 const TexelBody& texels() {
@@ -27,22 +30,6 @@ const TexelBody& texels() {
 const Bvh& clip_0103() {
   static const Bvh bvh = read_bvh("/usr/share/assimp/models/BVH/01_03.bvh");
   return bvh;
-}
-
-// World positions of the joints of one pose.
-std::vector<Vec3> joints_of(const figurine::Body& body, const PoseView& pose) {
-  std::vector<Affine> transforms(kJointCount);
-  skinning_transforms(body.mean_skeleton(), pose, transforms);
-  std::vector<Vec3> out;
-  for (size_t j = 0; j < kJointCount; ++j) {
-    const auto p = transform_point(transforms[j], &body.joint_position_m[3 * j]);
-    out.emplace_back(p[0], p[1], p[2]);
-  }
-  return out;
-}
-
-Vec3 direction(const std::vector<Vec3>& joints, int from, int to) {
-  return (joints[static_cast<size_t>(to)] - joints[static_cast<size_t>(from)]).normalized();
 }
 
 // The neutral frame of CMU's clip twice: what a person standing in a T-pose looks like.
