@@ -57,8 +57,8 @@ def main(folder, output, command):
     main_row = "shipped"
     parity = read(folder / "parity.json") or earlier
     oracle = read(pathlib.Path("docs/results/splat_oracle.json")) or {}
-    # Against the same trainer and the same number of iterations.
-    posed, frozen = figure(rows, main_row, "held_out_poses", "psnr_db"), figure(rows, "shipped_frozen_pose", "held_out_poses", "psnr_db")
+    # Same trainer, same number of iterations, one pose in each.
+    posed, frozen = figure(rows, "one_pose", "held_out_poses", "psnr_db"), figure(rows, "one_pose_frozen", "held_out_poses", "psnr_db")
     speed_run = read(folder / "runs" / "speed" / "run.json")
     speed = {"train_iterations_per_second": speed_run.get("iterations_per_second"), **speed_run} if speed_run else earlier
     result = {

@@ -77,7 +77,9 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
 uint32_t core_count() { return std::clamp(std::thread::hardware_concurrency(), 1u, 16u); }
 
 // Two one-thread trainings on two cores do more than one of two threads after the other (docs/training.md).
-uint32_t thread_count(const AvatarArguments& arguments) { return arguments.threads > 0 ? arguments.threads : arguments.all ? 1 : core_count(); }
+uint32_t thread_count(const AvatarArguments& arguments) {
+  return arguments.threads > 0 ? arguments.threads : arguments.all ? 1 : core_count();
+}
 
 uint32_t slot_count(const AvatarArguments& arguments) {
   return arguments.slots > 0 ? arguments.slots : std::max(1u, core_count() / thread_count(arguments));
@@ -168,7 +170,8 @@ void add_avatar_command(CLI::App& app) {
       ->check(CLI::IsMember({"black", "grey", "random"}));
   command->add_option("--views-per-pose", arguments->views, "Images of one pose an iteration (default 1, as in the paper)")
       ->check(CLI::Range(1, 64));
-  command->add_option("--poses", arguments->poses, "Poses an iteration, side by side on threads of their own (default 1)")->check(CLI::Range(1, 64));
+  command->add_option("--poses", arguments->poses, "Poses an iteration, side by side on threads of their own (default 1)")
+      ->check(CLI::Range(1, 64));
   command
       ->add_option("--spacing-scale", arguments->spacing_scale, "First radius of a Gaussian, in distances to the next texel (default 0.45)")
       ->check(CLI::Range(0.05, 5.0));
@@ -182,11 +185,7 @@ void add_avatar_command(CLI::App& app) {
       const auto request_of = [&](const std::string& identity) {
         return make_request(*arguments, arguments->data + "/" + identity, arguments->run + "/" + identity);
       };
-      train_all({.data = arguments->data,
-                 .runs = arguments->run,
-                 .slots = slot_count(*arguments),
-                 .quiet = arguments->quiet},
-                request_of);
+      train_all({.data = arguments->data, .runs = arguments->run, .slots = slot_count(*arguments), .quiet = arguments->quiet}, request_of);
     } else {
       train_one(*arguments);
     }

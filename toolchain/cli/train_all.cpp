@@ -78,8 +78,9 @@ void train_all(const TrainAllOptions& options, const std::function<train::TrainR
     request.quiet = true;
     const train::TrainResult result = train::train_avatar(request);
     // What a finished run was found with is in its run.json; means of the last iterations are not known then.
-    const double psnr_db = result.was_finished ? train::read_json(train::RunDirectory{request.run}.run_json()).at("running").at("psnr_db").get<double>()
-                                               : result.psnr_db;
+    const double psnr_db = result.was_finished
+                               ? train::read_json(train::RunDirectory{request.run}.run_json()).at("running").at("psnr_db").get<double>()
+                               : result.psnr_db;
     return nlohmann::json{{"iterations", result.state.iteration}, {"seconds", result.state.seconds}, {"psnr_db", psnr_db}}.dump();
   };
   const auto on_end = [&](size_t i, const train::JobResult& result) {
@@ -99,8 +100,11 @@ void train_all(const TrainAllOptions& options, const std::function<train::TrainR
                   std::to_string(ended) + " of " + std::to_string(rows.size()) + " identities, " + std::to_string(failed) + " failed");
   };
   train::run_in_slots(rows.size(), {.slots = options.slots}, job, on_end, on_wait);
-  if (!options.quiet) std::printf("%s: %zu of %zu identities trained, table in %s\n", options.runs.c_str(), rows.size() - failed, rows.size(), table.c_str());
-  if (failed > 0) throw InputError(options.runs + ": " + std::to_string(failed) + " of " + std::to_string(rows.size()) + " identities failed, see " + table);
+  if (!options.quiet)
+    std::printf("%s: %zu of %zu identities trained, table in %s\n", options.runs.c_str(), rows.size() - failed, rows.size(), table.c_str());
+  if (failed > 0)
+    throw InputError(options.runs + ": " + std::to_string(failed) + " of " + std::to_string(rows.size()) + " identities failed, see " +
+                     table);
 }
 
 }  // namespace figurine::cli

@@ -32,7 +32,7 @@ class Lanes {
   };
   void work(unsigned lane, const std::function<void()>& begin);
 
-  std::vector<std::unique_ptr<Worker>> workers_;  // lanes 1..count-1
+  std::vector<std::unique_ptr<Worker>> workers_;         // lanes 1..count-1
   const std::function<void(unsigned)>* step_ = nullptr;  // null: end
 };
 

@@ -31,7 +31,7 @@ struct SampleView {
 
 struct Sample {
   uint64_t number = 0;  // counted from the start of the training
-  size_t frame = 0;  // of the data set's list
+  size_t frame = 0;     // of the data set's list
   PosedBody posed;
   std::vector<SampleView> views;  // of that frame, the shuffled order's own first
   std::array<float, 3> background{0, 0, 0};

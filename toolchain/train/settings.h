@@ -46,7 +46,7 @@ struct TrainSettings {
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-10, weight_decay = 0;
   bool bf16 = false;  // arithmetic of the convolutions while training; weights, head and evaluation are float
   uint32_t threads = 1;
-  uint32_t views_per_pose = 1;  // images of one pose an iteration, sharing one run of the network; the paper's batch is 1
+  uint32_t views_per_pose = 1;       // images of one pose an iteration, sharing one run of the network; the paper's batch is 1
   uint32_t poses_per_iteration = 1;  // each on its own share of the threads; their gradients are averaged
   float ssim_weight = 0.1f;
   float mask_weight = 0.1f;

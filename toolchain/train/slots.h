@@ -1,5 +1,5 @@
-// Many independent jobs in processes of their own, a fixed number at a time: a job that crashes, is killed or runs out of disk takes no other
-// with it, and two one-thread trainings on two cores do more than one two-thread training after the other.
+// Many independent jobs in processes of their own, a fixed number at a time: a job that crashes, is killed or runs out of disk takes no
+// other with it, and two one-thread trainings on two cores do more than one two-thread training after the other.
 //
 // A job runs in a forked copy of the caller, so the caller must not have started threads (LibTorch's included) before. Jobs end when their
 // parent does: they get SIGINT, save, and stop.

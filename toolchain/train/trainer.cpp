@@ -79,8 +79,9 @@ class Trainer {
         data_(data),
         description_(std::move(description)),
         model_(body.package.body(), data.shape(), lane_settings(), settings.bf16),
-        optimiser_(settings.optimiser == OptimiserKind::kMuon ? model_.unet().muon_groups() : model::adamw_group(model_.unet().parameter_count()),
-                   {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {
+        optimiser_(
+            settings.optimiser == OptimiserKind::kMuon ? model_.unet().muon_groups() : model::adamw_group(model_.unet().parameter_count()),
+            {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {
     for (unsigned lane = 1; lane < lane_count(settings_); ++lane) {
       replicas_.push_back(std::make_unique<AvatarModel>(body.package.body(), data.shape(), lane_settings(), settings.bf16));
       replicas_.back()->unet().share_weights(model_.unet());

@@ -1,8 +1,8 @@
 // The paper's first stage: fits one person's UNet to the person's images.
 //
-// Every iteration draws one image of one training pose: pose maps -> UNet -> Gaussians -> picture -> L1 + 0.1 SSIM + 0.1 mask -> optimiser. The
-// picture is cropped to the true mask with a margin; every 16th iteration looks at the whole image, so that nothing can hide outside. LPIPS
-// (0.01 in the paper) is left out: no pretrained AlexNet comes with the platform. Saves a checkpoint every half minute and when
+// Every iteration draws one image of one training pose: pose maps -> UNet -> Gaussians -> picture -> L1 + 0.1 SSIM + 0.1 mask -> optimiser.
+// The picture is cropped to the true mask with a margin; every 16th iteration looks at the whole image, so that nothing can hide outside.
+// LPIPS (0.01 in the paper) is left out: no pretrained AlexNet comes with the platform. Saves a checkpoint every half minute and when
 // interrupted.
 //
 // Based on: the paper, section 4.1 and implementation details; Pang et al., ASH: Animatable Gaussian Splats for Efficient and Photoreal

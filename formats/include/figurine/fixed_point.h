@@ -77,10 +77,10 @@ inline int8_t requantise(int32_t sum, float multiplier, int32_t zero_point, int3
                              zero_point);
 }
 
-// Everything that makes the arithmetic above defined and exact, so that an evaluation cannot fail: counts; finite positive normal scales, of
-// sums too; zero points in range; weights in -127 to 127; no sum can overflow int32; multipliers within XNNPACK's range (2^-32 to 256); pool, upsample and
-// concatenation with equal quantisation on all sides; value 0 read by convolutions alone, with zero point 0; the last layer a convolution
-// without ReLU whose result nobody reads. kCorrupt "fixed point: layer N: ...".
+// Everything that makes the arithmetic above defined and exact, so that an evaluation cannot fail: counts; finite positive normal scales,
+// of sums too; zero points in range; weights in -127 to 127; no sum can overflow int32; multipliers within XNNPACK's range (2^-32 to 256);
+// pool, upsample and concatenation with equal quantisation on all sides; value 0 read by convolutions alone, with zero point 0; the last
+// layer a convolution without ReLU whose result nobody reads. kCorrupt "fixed point: layer N: ...".
 Status validate_fixed_point(const Network& network, const FixedPointNetwork& fixed);
 
 // What one evaluation made of every value, for tests and for the trainer.

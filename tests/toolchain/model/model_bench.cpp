@@ -65,7 +65,8 @@ int main(int argc, char** argv) {
   Splatter<float> splatter({.threads = threads});
   torch::set_num_threads(static_cast<int>(threads));
   const bool bf16 = argc <= 3 || std::string(argv[3]) == "bf16";
-  PoseUNet unet(make_pose_unet(128, 26, 32, head_channels(0)), {.precision = bf16 ? model::Precision::kBfloat16 : model::Precision::kFloat32, .seed = 1});
+  PoseUNet unet(make_pose_unet(128, 26, 32, head_channels(0)),
+                {.precision = bf16 ? model::Precision::kBfloat16 : model::Precision::kFloat32, .seed = 1});
   Optimiser adamw(adamw_group(unet.parameter_count()), {}), muon(unet.muon_groups(), {});
   AvatarRenderer renderer({.threads = threads});
   const torch::Tensor input = torch::randn({128, 128, 26}), head_weights = torch::randn({128, 128, 14});

@@ -314,7 +314,8 @@ TEST(Optimiser, MuonMovesAKernelByItsEquationsAndLeavesTheRestToAdamW) {
   }
   EXPECT_LT((matrix(weights) - expected).abs().max().item<double>(), 1e-6);
   for (const ParameterGroup& group : {groups[3], groups[28], groups[29]}) {
-    EXPECT_TRUE(torch::equal(weights.narrow(0, group.begin, group.end - group.begin), other.narrow(0, group.begin, group.end - group.begin)));
+    EXPECT_TRUE(
+        torch::equal(weights.narrow(0, group.begin, group.end - group.begin), other.narrow(0, group.begin, group.end - group.begin)));
   }
 }
 

@@ -1,5 +1,5 @@
-// Jobs in processes of their own: how each ends is told, and a training that is killed at any moment goes on to the same bits. Trainings run
-// in forked children here, so this process starts no thread before the last comparison.
+// Jobs in processes of their own: how each ends is told, and a training that is killed at any moment goes on to the same bits. Trainings
+// run in forked children here, so this process starts no thread before the last comparison.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 using testing_tools::small_capture;
 using testing_tools::TemporaryFolder;
 
-std::map<size_t, JobResult> results_of(size_t count, unsigned slots, const std::function<std::string(size_t)>& job,
-                                       const std::function<void()>& waiting = [] {}) {
+std::map<size_t, JobResult> results_of(
+    size_t count, unsigned slots, const std::function<std::string(size_t)>& job, const std::function<void()>& waiting = [] {}) {
   std::map<size_t, JobResult> results;
   run_in_slots(
       count, {.slots = slots, .poll_period_s = 0.01}, job, [&](size_t i, const JobResult& result) { results[i] = result; }, waiting);
@@ -116,7 +116,8 @@ TEST(Slots, ATrainingKilledAnywhereResumesToTheSameBits) {
     const auto job = [&](size_t) {
       const fs::file_time_type before = fs::exists(checkpoint) ? fs::last_write_time(checkpoint) : fs::file_time_type::min();
       std::thread([=] {
-        while (!fs::exists(checkpoint) || fs::last_write_time(checkpoint) <= before) std::this_thread::sleep_for(std::chrono::microseconds(200));
+        while (!fs::exists(checkpoint) || fs::last_write_time(checkpoint) <= before)
+          std::this_thread::sleep_for(std::chrono::microseconds(200));
         std::this_thread::sleep_for(std::chrono::milliseconds(3 * round));
         kill(getpid(), SIGKILL);
       }).detach();

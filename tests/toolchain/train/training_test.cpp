@@ -11,6 +11,7 @@
 #include "toolchain/error.h"
 #include "toolchain/evaluate/reconstruction.h"
 #include "toolchain/train/interrupt.h"
+#include "toolchain/train/lanes.h"
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/sample_feed.h"
 #include "toolchain/train/trained_avatar.h"
@@ -91,6 +92,42 @@ TEST(Training, ResumedAfterAnInterruptEqualsAnUninterruptedRunBitwise) {
   const TrainResult result = train_avatar(broken);
   EXPECT_EQ(result.state.iteration, 90u);
   EXPECT_EQ(bytes_of(RunDirectory{broken.run}.weights()), bytes_of(RunDirectory{straight.run}.weights()));
+}
+
+TEST(Training, OfSeveralPosesAnIterationGivesTheSameBitsOnOneThreadAndOnTwo) {
+  const TemporaryFolder folder;
+  TrainRequest side_by_side = request(folder.path("side_by_side"), 30);
+  side_by_side.settings.poses_per_iteration = 3;  // one lane takes two of them
+  side_by_side.settings.threads = 2;
+  train_avatar(side_by_side);
+  TrainRequest in_turn = side_by_side;
+  in_turn.run = folder.path("in_turn");
+  in_turn.settings.threads = 1;
+  in_turn.stop_after = 11;
+  EXPECT_THROW(train_avatar(in_turn), Interrupted);
+  in_turn.stop_after = 0;
+  in_turn.resume = true;
+  train_avatar(in_turn);
+  EXPECT_EQ(bytes_of(RunDirectory{in_turn.run}.weights()), bytes_of(RunDirectory{side_by_side.run}.weights()));
+  TrainRequest one = request(folder.path("one"), 30);
+  train_avatar(one);
+  EXPECT_NE(bytes_of(RunDirectory{one.run}.weights()), bytes_of(RunDirectory{side_by_side.run}.weights()));
+}
+
+TEST(Lanes, PassOnWhatTheLowestLaneThrewAndGoOn) {
+  Lanes lanes(3, [] {});
+  std::array<int, 3> calls{};
+  try {
+    lanes.run([&](unsigned lane) {
+      ++calls[lane];
+      if (lane > 0) throw InputError("lane " + std::to_string(lane));
+    });
+    FAIL() << "nothing was thrown";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "lane 1");
+  }
+  lanes.run([&](unsigned lane) { ++calls[lane]; });
+  EXPECT_EQ(calls, (std::array<int, 3>{2, 2, 2}));
 }
 
 TEST(Training, OfAFinishedRunHasNothingToResume) {
