@@ -170,26 +170,66 @@ Json describe_fixed_point(const Avatar& avatar) {
   return {{"bytes", bytes}, {"input_scale", number(fixed.values[0].scale)}, {"layers", layers}};
 }
 
+const char* template_name(TemplateMode mode) { return mode == TemplateMode::kMean ? "mean" : "shaped"; }
+
+Json describe_decoding(const HeadDecoding& decoding) {
+  return {{"offset_scale_m", number(decoding.offset_scale_m)},
+          {"spacing_scale", number(decoding.spacing_scale)},
+          {"max_log_scale", number(decoding.max_log_scale)},
+          {"opacity_bias", number(decoding.opacity_bias)},
+          {"sh_degree", decoding.sh_degree}};
+}
+
 Json describe_avatar(const Avatar& avatar) {
-  const HeadDecoding& decoding = avatar.decoding;
   return {{"body", {{"name", avatar.body_name}, {"hash", format_hash(avatar.body_hash)}}},
           {"preset", avatar.preset},
-          {"template", avatar.template_mode == TemplateMode::kMean ? "mean" : "shaped"},
+          {"template", template_name(avatar.template_mode)},
           {"shape", numbers(avatar.shape)},
           {"fourier_octaves", avatar.fourier_octaves},
           {"map_mean", numbers(avatar.map_statistics.mean)},
           {"map_scale", numbers(avatar.map_statistics.scale)},
-          {"decoding",
-           {{"offset_scale_m", number(decoding.offset_scale_m)},
-            {"spacing_scale", number(decoding.spacing_scale)},
-            {"max_log_scale", number(decoding.max_log_scale)},
-            {"opacity_bias", number(decoding.opacity_bias)},
-            {"sh_degree", decoding.sh_degree}}},
+          {"decoding", describe_decoding(avatar.decoding)},
           {"network", describe_network(avatar.network)},
           {"precisions", describe_precisions(avatar)},
           {"fixed_point", describe_fixed_point(avatar)},
           {"pose_statistics_joints", avatar.pose_statistics.joints},
           {"golden", describe_golden(avatar.golden)}};
+}
+
+Json describe_member(const Package& package, size_t m) {
+  const Population& population = package.population();
+  const PopulationMember& member = population.members[m];
+  const Provenance whole = package.member_provenance(m);
+  // What the member has beside the package: behind the package's own entries.
+  Provenance own = whole;
+  own.settings.erase(own.settings.begin(), own.settings.begin() + std::ssize(package.provenance().settings));
+  own.sources.erase(own.sources.begin(), own.sources.begin() + std::ssize(package.provenance().sources));
+  const size_t coefficients = population.shape.size() / population.size();
+  return {{"number", m},
+          {"name", member.name},
+          {"split", to_string(member.split)},
+          {"difference_bytes", difference_bytes(population, m)},
+          {"shape", numbers(population.shape.subspan(m * coefficients, coefficients))},
+          {"map_mean", numbers(member.map_statistics.mean)},
+          {"map_scale", numbers(member.map_statistics.scale)},
+          {"decoding", describe_decoding(member.decoding)},
+          {"golden", describe_golden(member.golden)},
+          {"provenance", describe_provenance(own)}};
+}
+
+Json describe_population(const Package& package) {
+  const Population& population = package.population();
+  Json members = Json::array();
+  for (size_t m = 0; m < population.size(); ++m) members.push_back(describe_member(package, m));
+  return {{"body", {{"name", population.body_name}, {"hash", format_hash(population.body_hash)}}},
+          {"preset", population.preset},
+          {"template", template_name(population.template_mode)},
+          {"fourier_octaves", population.fourier_octaves},
+          {"network", describe_network(population.network)},
+          {"coding", to_string(population.coding)},
+          {"pose_statistics_joints", population.pose_joints},
+          {"quality_names", population.quality_names},
+          {"members", members}};
 }
 
 }  // namespace
@@ -222,6 +262,10 @@ Json describe(const Package& package, const std::string& path) {
       document["name"] = package.motion().name;
       document["motion"] = describe_motion(package.motion());
       break;
+    case PackageKind::kPopulation:
+      document["name"] = package.population().name;
+      document["population"] = describe_population(package);
+      break;
   }
   document["provenance"] = describe_provenance(package.provenance());
   return document;
@@ -238,7 +282,7 @@ Json describe_tensors(const Package& package, std::span<const std::byte> bytes) 
       sum += values[i];
     }
     const double mean = sum / static_cast<double>(values.count());
-    const bool is_float = tensor.type == DataType::kF32;
+    const bool is_float = tensor.type == DataType::kF32 || tensor.type == DataType::kF16;
     list.push_back({{"name", tensor.name},
                     {"type", to_string(tensor.type)},
                     {"shape", tensor.shape},

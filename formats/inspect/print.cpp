@@ -1,5 +1,6 @@
 #include "formats/inspect/print.h"
 
+#include <algorithm>
 #include <format>
 #include <vector>
 
@@ -92,16 +93,19 @@ void print_motion(Page& page, const Json& motion) {
   page.line("joint order", wrapped(names));
 }
 
+void print_network(Page& page, const Json& network) {
+  page.line("network", std::format("input {0}x{0}x{1}, {2} layers, {3} parameters, {4} MACs", text_of(network["input"]["size"]),
+                                   text_of(network["input"]["channels"]), network["layers"].size(), text_of(network["parameters"]),
+                                   in_millions(network["macs"])));
+}
+
 void print_avatar(Page& page, const Json& avatar) {
   page.heading("avatar");
   page.line("body", text_of(avatar["body"]["name"]) + "  " + text_of(avatar["body"]["hash"]));
   page.line("joint order", "the body's");
   page.line("preset", text_of(avatar["preset"]));
   page.line("template", text_of(avatar["template"]) + ", " + std::to_string(avatar["shape"].size()) + " shape coefficients");
-  const Json& network = avatar["network"];
-  page.line("network", std::format("input {0}x{0}x{1}, {2} layers, {3} parameters, {4} MACs", text_of(network["input"]["size"]),
-                                   text_of(network["input"]["channels"]), network["layers"].size(), text_of(network["parameters"]),
-                                   in_millions(network["macs"])));
+  print_network(page, avatar["network"]);
   page.line("precision", joined(avatar["precisions"], ", "));
   if (const Json& fixed = avatar["fixed_point"]; !fixed.is_null()) {
     page.line("fixed point", std::format("{} of weights, scales and biases; one step of the input is {:.4g}", in_bytes(fixed["bytes"]),
@@ -127,7 +131,51 @@ void print_avatar(Page& page, const Json& avatar) {
   page.line("golden frame", frame);
 }
 
-void print_provenance(Page& page, const Json& provenance) {
+void print_population(Page& page, const Json& population) {
+  page.heading("population");
+  page.line("body", text_of(population["body"]["name"]) + "  " + text_of(population["body"]["hash"]));
+  page.line("joint order", "the body's");
+  page.line("preset", text_of(population["preset"]));
+  page.line("template", text_of(population["template"]));
+  print_network(page, population["network"]);
+  page.line("Fourier octaves", text_of(population["fourier_octaves"]));
+  const Json& members = population["members"];
+  std::string splits;
+  for (const char* split : {"train", "validation", "test"}) {
+    const auto count = std::ranges::count_if(members, [&](const Json& member) { return member["split"] == split; });
+    splits += std::format("{}{} {}", splits.empty() ? "" : ", ", count, split);
+  }
+  page.line("members", std::format("{}: {}", members.size(), splits));
+  page.line("differences", population["coding"] == "q8" ? "int8, one scale an output channel, entropy-coded" : "16-bit floats");
+}
+
+// The table's columns of quality: the first few figures, whatever they are called.
+constexpr size_t kQualityColumns = 4;
+
+std::string print_members(const Json& population) {
+  size_t width = 6;
+  for (const Json& member : population["members"]) width = std::max(width, text_of(member["name"]).size() + 2);
+  std::vector<std::string> names;
+  for (const Json& name : population["quality_names"]) {
+    if (names.size() < kQualityColumns) names.push_back(text_of(name));
+  }
+  std::string text = std::format("\n{:>6}  {:<{}}{:<12}{:>9}", "number", "name", width, "split", "bytes");
+  for (const std::string& name : names) text += std::format("{:>{}}", name, name.size() + 2);
+  text += "\n";
+  for (const Json& member : population["members"]) {
+    text += std::format("{:>6}  {:<{}}{:<12}{:>9}", text_of(member["number"]), text_of(member["name"]), width, text_of(member["split"]),
+                        text_of(member["difference_bytes"]));
+    const Json& quality = member["provenance"]["quality"];
+    for (const std::string& name : names) {
+      const std::string figure = quality.contains(name) ? std::format("{:.2f}", quality[name].get<double>()) : "-";
+      text += std::format("{:>{}}", figure, name.size() + 2);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+void print_provenance(Page& page, const Json& provenance, bool has_members) {
   page.heading("provenance");
   page.line("tool", text_of(provenance["tool"]));
   page.line("created", text_of(provenance["created"]));
@@ -142,7 +190,8 @@ void print_provenance(Page& page, const Json& provenance) {
   page.line("quality", quality);
   page.line("authors", joined(provenance["authors"], ", "));
   page.heading("licence");
-  page.line("name", provenance["licence_name"] == "" ? "not stated" : text_of(provenance["licence_name"]));
+  page.line("name", provenance["licence_name"] == "" ? has_members ? "not stated here; each member has its own" : "not stated"
+                                                     : text_of(provenance["licence_name"]));
   page.line("url", text_of(provenance["licence_url"]));
   page.line("who may perform", text_of(provenance["avatar_permission"]));
   page.line("commercial usage", text_of(provenance["commercial_usage"]));
@@ -163,7 +212,7 @@ std::string print_package(const Json& document) {
 
   page.heading("what it needs");
   const Json& budget = document["budget"];
-  if (document["kind"] == "avatar") {
+  if (document["kind"] == "avatar" || document["kind"] == "population") {
     page.line("peak memory", in_bytes(budget["peak_memory_bytes"]));
     page.line("MACs a frame", in_millions(budget["macs_per_frame"]));
   }
@@ -176,8 +225,9 @@ std::string print_package(const Json& document) {
   if (document.contains("body")) print_body(page, document["body"]);
   if (document.contains("avatar")) print_avatar(page, document["avatar"]);
   if (document.contains("motion")) print_motion(page, document["motion"]);
-  print_provenance(page, document["provenance"]);
-  return page.text();
+  if (document.contains("population")) print_population(page, document["population"]);
+  print_provenance(page, document["provenance"], document.contains("population"));
+  return page.text() + (document.contains("population") ? print_members(document["population"]) : "");
 }
 
 std::string print_tensors(const Json& tensors) {

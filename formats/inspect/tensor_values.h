@@ -36,6 +36,11 @@ class TensorValues {
         return value_at<int8_t>(data_, index);
       case DataType::kI32:
         return value_at<int32_t>(data_, index);
+      case DataType::kF16: {
+        Half half;
+        std::memcpy(&half, data_ + index * sizeof(half), sizeof(half));
+        return to_float(half);
+      }
     }
     return 0;
   }

@@ -1,5 +1,6 @@
 #include "figurine/package.h"
 
+#include <cmath>
 #include <variant>
 
 #include "formats/src/checksum.h"
@@ -15,6 +16,8 @@ const char* to_string(PackageKind kind) {
       return "avatar";
     case PackageKind::kMotion:
       return "motion";
+    case PackageKind::kPopulation:
+      return "population";
   }
   return "unknown";
 }
@@ -33,6 +36,8 @@ const char* to_string(DataType type) {
       return "i8";
     case DataType::kI32:
       return "i32";
+    case DataType::kF16:
+      return "f16";
   }
   return "unknown";
 }
@@ -45,6 +50,7 @@ size_t size_bytes(DataType type) {
     case DataType::kI8:
       return 1;
     case DataType::kI16:
+    case DataType::kF16:
       return 2;
     case DataType::kF32:
     case DataType::kU32:
@@ -57,7 +63,7 @@ size_t size_bytes(DataType type) {
 struct Package::Contents {
   layout::Header header;
   std::array<uint64_t, 2> content_hash{0, 0};
-  std::variant<Body, Avatar, Motion> content;
+  std::variant<Body, Avatar, Motion, PopulationContent> content;
   Budget budget;
   Provenance provenance;
   std::vector<TensorInfo> tensors;
@@ -106,6 +112,9 @@ Result<Package> Package::open(std::span<const std::byte> bytes, const std::strin
       case PackageKind::kMotion:
         FIG_RETURN_IF_ERROR(read_motion(index, blobs, contents->content.emplace<Motion>()));
         break;
+      case PackageKind::kPopulation:
+        FIG_RETURN_IF_ERROR(read_population(index, blobs, contents->budget, contents->content.emplace<PopulationContent>()));
+        break;
     }
     FIG_RETURN_IF_ERROR(check_features(contents->header, std::get_if<Avatar>(&contents->content)));
     return blobs.check_all_known();
@@ -138,6 +147,29 @@ const Avatar& Package::avatar() const {
 const Motion& Package::motion() const {
   FIG_CHECK(kind() == PackageKind::kMotion, "the package is not a motion");
   return *std::get_if<Motion>(&contents_->content);
+}
+
+const Population& Package::population() const {
+  FIG_CHECK(kind() == PackageKind::kPopulation, "the package is not a population");
+  return std::get_if<PopulationContent>(&contents_->content)->population;
+}
+
+Provenance Package::member_provenance(size_t member) const {
+  const Population& all = population();
+  FIG_CHECK(member < all.size(), "a member of the population");
+  const Provenance& own = std::get_if<PopulationContent>(&contents_->content)->own[member];
+  Provenance merged = contents_->provenance;
+  for (std::string Provenance::* text : kProvenanceTexts) {
+    if (!(own.*text).empty()) merged.*text = own.*text;
+  }
+  if (!own.authors.empty()) merged.authors = own.authors;
+  merged.settings.insert(merged.settings.end(), own.settings.begin(), own.settings.end());
+  merged.sources.insert(merged.sources.end(), own.sources.begin(), own.sources.end());
+  merged.quality.clear();
+  for (size_t k = 0; k < all.members[member].quality.size(); ++k) {
+    if (!std::isnan(all.members[member].quality[k])) merged.quality.push_back({all.quality_names[k], all.members[member].quality[k]});
+  }
+  return merged;
 }
 
 std::string format_hash(const std::array<uint64_t, 2>& hash) {

@@ -10,8 +10,6 @@
 
 namespace figurine {
 
-namespace {
-
 Status read_map_statistics(const schema::MapStatistics& table, MapStatistics& out) {
   for (uint32_t c = 0; c < kMapChannels; ++c) {
     out.mean[c] = table.mean()->Get(c);
@@ -54,6 +52,24 @@ Status read_layers(const schema::Network& table, Network& out) {
   return infer_shapes(out, false).status();
 }
 
+Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader::Presence presence, Network& out) {
+  const std::vector<ValueShape> shapes = *infer_shapes(out, false);
+  for (size_t i = 0; i < out.layers.size(); ++i) {
+    Layer& layer = out.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    const std::string name = concatenate({prefix, ".", i});
+    const uint32_t in_channels = shapes[layer.inputs[0]].channels;
+    FIG_RETURN_IF_ERROR(
+        blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, layer.weights, presence));
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, layer.bias, presence));
+    FIG_RETURN_IF_ERROR(check_magnitude(layer.weights, name + ".weights", std::numeric_limits<float>::max()));
+    FIG_RETURN_IF_ERROR(check_magnitude(layer.bias, name + ".bias", std::numeric_limits<float>::max()));
+  }
+  return {};
+}
+
+namespace {
+
 // A convolution without float weights is allowed only where none has any.
 Status check_all_or_none(const Network& network) {
   const auto holds = [](const Layer& layer) { return !layer.weights.empty() || !layer.bias.empty(); };
@@ -68,21 +84,8 @@ Status check_all_or_none(const Network& network) {
 
 // All of them, or none if the network is there in fixed point.
 Status read_float_weights(BlobReader& blobs, bool has_fixed_point, Network& out) {
-  const std::vector<ValueShape> shapes = *infer_shapes(out, false);
-  const auto presence = has_fixed_point ? BlobReader::kMayBeAbsent : BlobReader::kRequired;
-  for (size_t i = 0; i < out.layers.size(); ++i) {
-    Layer& layer = out.layers[i];
-    if (layer.op != LayerOp::kConv2d) continue;
-    const std::string name = concatenate({"network.", i});
-    const uint32_t in_channels = shapes[layer.inputs[0]].channels;
-    FIG_RETURN_IF_ERROR(
-        blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, layer.weights, presence));
-    FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, layer.bias, presence));
-    FIG_RETURN_IF_ERROR(check_magnitude(layer.weights, name + ".weights", std::numeric_limits<float>::max()));
-    FIG_RETURN_IF_ERROR(check_magnitude(layer.bias, name + ".bias", std::numeric_limits<float>::max()));
-  }
-  if (has_fixed_point) FIG_RETURN_IF_ERROR(check_all_or_none(out));
-  return {};
+  FIG_RETURN_IF_ERROR(read_convolutions(blobs, "network", has_fixed_point ? BlobReader::kMayBeAbsent : BlobReader::kRequired, out));
+  return has_fixed_point ? check_all_or_none(out) : Status();
 }
 
 Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, const Network& network, FixedPointNetwork& out) {
@@ -112,6 +115,8 @@ Status read_network(const schema::Avatar& table, BlobReader& blobs, Avatar& out)
   FIG_RETURN_IF_ERROR(read_float_weights(blobs, has_fixed_point, out.network));
   return has_fixed_point ? read_fixed_point(*table.fixed_point(), blobs, out.network, out.fixed_point) : Status();
 }
+
+}  // namespace
 
 Status check_network_fits(const Avatar& avatar, const Budget& budget) {
   const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, false);
@@ -145,6 +150,8 @@ Status check_network_fits(const Avatar& avatar, const Budget& budget) {
   return {};
 }
 
+namespace {
+
 // Cholesky in double: succeeds exactly if the matrix is positive definite beyond rounding.
 bool is_positive_definite(std::span<const float> matrix, size_t n) {
   std::vector<double> lower(n * n, 0.0);
@@ -159,29 +166,39 @@ bool is_positive_definite(std::span<const float> matrix, size_t n) {
   return true;
 }
 
-Status read_pose_statistics(const schema::PoseStatistics& table, BlobReader& blobs, PoseStatistics& out) {
-  const auto& joints = *table.joints();
-  if (joints.size() < 1 || joints.size() > kMaxJoints) return corrupt("avatar.pose_statistics.joints", "does not list 1 to 255 joints");
-  out.joints.assign(joints.begin(), joints.end());
-  std::vector<uint8_t> sorted = out.joints;
+}  // namespace
+
+Status read_statistics_joints(const flatbuffers::Vector<uint8_t>& list, const std::string& field, std::vector<uint8_t>& out) {
+  if (list.size() < 1 || list.size() > kMaxJoints) return corrupt(field, "does not list 1 to 255 joints");
+  out.assign(list.begin(), list.end());
+  std::vector<uint8_t> sorted = out;
   std::sort(sorted.begin(), sorted.end());
-  if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())
-    return corrupt("avatar.pose_statistics.joints", "lists a joint twice");
-  const uint32_t n = joints.size() * 3;
-  FIG_RETURN_IF_ERROR(blobs.read("pose.mean", {n}, out.mean));
-  FIG_RETURN_IF_ERROR(blobs.read("pose.covariance", {n, n}, out.covariance));
-  FIG_RETURN_IF_ERROR(check_magnitude(out.mean, "pose.mean", 100));
-  FIG_RETURN_IF_ERROR(check_magnitude(out.covariance, "pose.covariance", 1e4f));
+  return std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end() ? Status() : corrupt(field, "lists a joint twice");
+}
+
+Status check_covariance(std::span<const float> covariance, size_t n, const std::string& field) {
+  FIG_RETURN_IF_ERROR(check_magnitude(covariance, field, 1e4f));
   for (size_t i = 0; i < n; ++i) {
-    if (!(out.covariance[i * n + i] > 0)) return corrupt("pose.covariance", "row ", i, ": the variance is not positive");
+    if (!(covariance[i * n + i] > 0)) return corrupt(field, "row ", i, ": the variance is not positive");
     for (size_t j = 0; j < i; ++j) {
-      const float a = out.covariance[i * n + j], b = out.covariance[j * n + i];
+      const float a = covariance[i * n + j], b = covariance[j * n + i];
       if (std::fabs(a - b) > 1e-6f * std::max(std::fabs(a), std::fabs(b))) {
-        return corrupt("pose.covariance", "is not symmetric in row ", i, ", column ", j);
+        return corrupt(field, "is not symmetric in row ", i, ", column ", j);
       }
     }
   }
-  return is_positive_definite(out.covariance, n) ? Status() : corrupt("pose.covariance", "is not positive definite");
+  return is_positive_definite(covariance, n) ? Status() : corrupt(field, "is not positive definite");
+}
+
+namespace {
+
+Status read_pose_statistics(const schema::PoseStatistics& table, BlobReader& blobs, PoseStatistics& out) {
+  FIG_RETURN_IF_ERROR(read_statistics_joints(*table.joints(), "avatar.pose_statistics.joints", out.joints));
+  const uint32_t n = static_cast<uint32_t>(out.joints.size()) * 3;
+  FIG_RETURN_IF_ERROR(blobs.read("pose.mean", {n}, out.mean));
+  FIG_RETURN_IF_ERROR(blobs.read("pose.covariance", {n, n}, out.covariance));
+  FIG_RETURN_IF_ERROR(check_magnitude(out.mean, "pose.mean", 100));
+  return check_covariance(out.covariance, n, "pose.covariance");
 }
 
 // The image's size stands in the first chunk of every PNG.
@@ -196,7 +213,9 @@ Status check_png(std::span<const uint8_t> png, const Camera& camera) {
   return {};
 }
 
-Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFrame& out) {
+}  // namespace
+
+Status read_golden_view(const schema::GoldenFrame& table, GoldenFrame& out) {
   const auto vec3 = [](const schema::Vec3& v) { return std::array<float, 3>{v.x(), v.y(), v.z()}; };
   out.root_translation_m = vec3(*table.root_translation_m());
   out.background = vec3(*table.background());
@@ -213,12 +232,22 @@ Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFr
   for (float channel : out.background) {
     if (!(channel >= 0 && channel <= 1)) return corrupt("golden.background", "is not within 0 and 1");
   }
-  FIG_RETURN_IF_ERROR(blobs.read("golden.rotations", {BlobReader::kAny, 4}, out.rotations));
-  const size_t joints = out.rotations.size() / 4;
+  return {};
+}
+
+Status check_golden_pose(const GoldenFrame& golden) {
+  const size_t joints = golden.rotations.size() / 4;
   if (joints > kMaxJoints) return corrupt("golden.rotations", "has more than 255 joints");
-  if (const Status status = validate_pose({out.root_translation_m, out.rotations}, static_cast<uint32_t>(joints)); !status.ok()) {
-    return corrupt("golden", status.message());
-  }
+  const Status status = validate_pose({golden.root_translation_m, golden.rotations}, static_cast<uint32_t>(joints));
+  return status.ok() ? Status() : corrupt("golden", status.message());
+}
+
+namespace {
+
+Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFrame& out) {
+  FIG_RETURN_IF_ERROR(read_golden_view(table, out));
+  FIG_RETURN_IF_ERROR(blobs.read("golden.rotations", {BlobReader::kAny, 4}, out.rotations));
+  FIG_RETURN_IF_ERROR(check_golden_pose(out));
   out.fixed_point_hash = {table.fixed_point_hash_low(), table.fixed_point_hash_high()};
   if (table.fixed_point_library() != nullptr) {
     FIG_RETURN_IF_ERROR(

@@ -22,8 +22,8 @@ Status check_header(const Header& header, uint64_t actual_bytes, std::span<const
   if (const uint64_t unknown = header.required_features & ~layout::kKnownRequiredFeatures; unknown != 0) {
     return unsupported("header.required_features", "needs features that this build does not know, as a bit field: ", unknown);
   }
-  if (header.kind < uint32_t(PackageKind::kBody) || header.kind > uint32_t(PackageKind::kMotion)) {
-    return unsupported("header.kind", "is ", header.kind, ", this build knows 1 (body), 2 (avatar), 3 (motion)");
+  if (header.kind < uint32_t(PackageKind::kBody) || header.kind > uint32_t(PackageKind::kPopulation)) {
+    return unsupported("header.kind", "is ", header.kind, ", this build knows 1 (body), 2 (avatar), 3 (motion), 4 (population)");
   }
   if (header.file_bytes != actual_bytes) {
     return corrupt("header.file_bytes", "the file has ", actual_bytes, " bytes, its header says ", header.file_bytes);
@@ -162,6 +162,7 @@ Status BlobReader::read(std::string_view name, std::initializer_list<uint32_t> s
                              : std::is_same_v<T, int8_t>  ? DataType::kI8
                              : std::is_same_v<T, int16_t> ? DataType::kI16
                              : std::is_same_v<T, int32_t> ? DataType::kI32
+                             : std::is_same_v<T, Half>    ? DataType::kF16
                                                           : DataType::kU32;
   const BlobView* blob = nullptr;
   FIG_RETURN_IF_ERROR(find(name, kType, shape, presence, blob));
@@ -175,6 +176,7 @@ template Status BlobReader::read(std::string_view, std::initializer_list<uint32_
 template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const int16_t>&, Presence);
 template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const int32_t>&, Presence);
 template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const uint32_t>&, Presence);
+template Status BlobReader::read(std::string_view, std::initializer_list<uint32_t>, std::span<const Half>&, Presence);
 
 Status BlobReader::check_all_known() const {
   for (const auto& [name, entry] : entries_) {

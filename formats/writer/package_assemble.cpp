@@ -67,17 +67,27 @@ Offset<schema::FixedPoint> build_fixed_point(FlatBufferBuilder& b, const FixedPo
   return schema::CreateFixedPoint(b, b.CreateVectorOfStructs(values));
 }
 
-Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
-  const auto body_name = b.CreateString(avatar.body_name), preset = b.CreateString(avatar.preset);
-  const schema::MapStatistics statistics(flatbuffers::span<const float, 6>(avatar.map_statistics.mean.data(), 6),
-                                         flatbuffers::span<const float, 6>(avatar.map_statistics.scale.data(), 6));
-  const HeadDecoding& d = avatar.decoding;
-  const auto decoding = schema::CreateHeadDecoding(b, d.offset_scale_m, d.spacing_scale, d.max_log_scale, d.opacity_bias, d.sh_degree);
-  const auto layers = build_list(b, avatar.network.layers, [&](const Layer& layer) {
+schema::MapStatistics build_map_statistics(const MapStatistics& statistics) {
+  return {flatbuffers::span<const float, 6>(statistics.mean.data(), 6), flatbuffers::span<const float, 6>(statistics.scale.data(), 6)};
+}
+
+Offset<schema::HeadDecoding> build_decoding(FlatBufferBuilder& b, const HeadDecoding& d) {
+  return schema::CreateHeadDecoding(b, d.offset_scale_m, d.spacing_scale, d.max_log_scale, d.opacity_bias, d.sh_degree);
+}
+
+Offset<schema::Network> build_network(FlatBufferBuilder& b, const Network& network) {
+  const auto layers = build_list(b, network.layers, [&](const Layer& layer) {
     return schema::CreateLayer(b, static_cast<schema::LayerOp>(layer.op), layer.inputs[0], layer.inputs[1], layer.out_channels,
                                layer.kernel, layer.relu);
   });
-  const auto network = schema::CreateNetwork(b, avatar.network.input_size, avatar.network.input_channels, layers);
+  return schema::CreateNetwork(b, network.input_size, network.input_channels, layers);
+}
+
+Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
+  const auto body_name = b.CreateString(avatar.body_name), preset = b.CreateString(avatar.preset);
+  const schema::MapStatistics statistics = build_map_statistics(avatar.map_statistics);
+  const auto decoding = build_decoding(b, avatar.decoding);
+  const auto network = build_network(b, avatar.network);
   Offset<schema::PoseStatistics> pose_statistics = 0;
   if (!avatar.pose_statistics.joints.empty()) {
     pose_statistics = schema::CreatePoseStatistics(b, b.CreateVector(avatar.pose_statistics.joints));
@@ -90,6 +100,61 @@ Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
       .Union();
 }
 
+// Strings that a table may lack: nothing for an empty one. One after the other, as everywhere: the order decides the bytes.
+Offset<flatbuffers::String> build_text(FlatBufferBuilder& b, const std::string& text) { return text.empty() ? 0 : b.CreateString(text); }
+
+Offset<flatbuffers::Vector<Offset<flatbuffers::String>>> build_texts(FlatBufferBuilder& b, const std::vector<std::string>& texts) {
+  if (texts.empty()) return 0;
+  return build_list(b, texts, [&](const std::string& text) { return b.CreateString(text); });
+}
+
+Offset<schema::Member> build_member(FlatBufferBuilder& b, const PopulationMember& member, const Provenance& own) {
+  std::vector<std::string> flat;
+  for (const KeyValue& setting : own.settings) flat.insert(flat.end(), {setting.key, setting.value});
+  const auto name = b.CreateString(member.name);
+  const auto decoding = build_decoding(b, member.decoding);
+  const auto golden = build_golden(b, member.golden);
+  Offset<flatbuffers::Vector<double>> quality = 0;
+  if (!member.quality.empty()) quality = b.CreateVector(member.quality);
+  const auto settings = build_texts(b, flat);
+  const auto sources = build_texts(b, own.sources);
+  const auto authors = build_texts(b, own.authors);
+  const auto tool = build_text(b, own.tool);
+  const auto created = build_text(b, own.created);
+  const auto licence_name = build_text(b, own.licence_name);
+  const auto licence_url = build_text(b, own.licence_url);
+  const auto permission = build_text(b, own.avatar_permission);
+  const auto usage = build_text(b, own.commercial_usage);
+  const auto person = build_text(b, own.depicted_person);
+  const schema::MapStatistics statistics = build_map_statistics(member.map_statistics);
+  return schema::CreateMember(b, name, static_cast<schema::Split>(member.split), &statistics, decoding, golden, quality, settings, sources,
+                              tool, created, licence_name, licence_url, authors, permission, usage, person);
+}
+
+Offset<void> build_content(FlatBufferBuilder& b, const Population& population, std::span<const Provenance> own) {
+  const auto body_name = b.CreateString(population.body_name);
+  const auto preset = b.CreateString(population.preset);
+  const auto network = build_network(b, population.network);
+  const auto quality_names = build_texts(b, population.quality_names);
+  Offset<flatbuffers::Vector<uint8_t>> pose_joints = 0;
+  if (!population.pose_joints.empty()) pose_joints = b.CreateVector(population.pose_joints);
+  std::vector<Offset<schema::Member>> members;
+  for (size_t m = 0; m < population.size(); ++m) members.push_back(build_member(b, population.members[m], own[m]));
+  const auto member_list = b.CreateVector(members);
+  return schema::CreatePopulation(b, body_name, population.body_hash[0], population.body_hash[1], preset,
+                                  static_cast<schema::TemplateMode>(population.template_mode), population.fourier_octaves, network,
+                                  static_cast<schema::DifferenceCoding>(population.coding), quality_names, pose_joints, member_list)
+      .Union();
+}
+
+Offset<void> build_content(FlatBufferBuilder& b, const PackageParts& parts) {
+  if (const auto* population = std::get_if<const Population*>(&parts.content))
+    return build_content(b, **population, parts.member_provenance);
+  if (const auto* avatar = std::get_if<const Avatar*>(&parts.content)) return build_content(b, **avatar);
+  if (const auto* motion = std::get_if<const Motion*>(&parts.content)) return build_content(b, **motion);
+  return build_content(b, **std::get_if<const Body*>(&parts.content));
+}
+
 void build_index(FlatBufferBuilder& b, const PackageParts& parts, const std::vector<schema::Extent>& extents) {
   const auto name = std::visit([&](const auto* content) { return b.CreateString(content->name); }, parts.content);
   const schema::Conventions conventions(schema::LengthUnit::Metre, schema::Axes::RightHandedYUp,
@@ -97,7 +162,7 @@ void build_index(FlatBufferBuilder& b, const PackageParts& parts, const std::vec
                                         schema::RestFrames::WorldAligned);
   const auto budget = schema::CreateBudget(b, parts.budget.peak_memory_bytes, parts.budget.macs_per_frame, parts.budget.gaussians);
   const auto provenance = build_provenance(b, parts.provenance);
-  const auto content = std::visit([&](const auto* described) { return build_content(b, *described); }, parts.content);
+  const auto content = build_content(b, parts);
   std::vector<Offset<schema::Blob>> blobs;
   for (size_t i = 0; i < parts.blobs.size(); ++i) {
     const BlobPart& part = parts.blobs[i];

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "figurine/rans.h"
+
 namespace figurine {
 
 namespace {
@@ -41,16 +43,17 @@ class PartList {
   static DataType type_of(int16_t) { return DataType::kI16; }
   static DataType type_of(int32_t) { return DataType::kI32; }
   static DataType type_of(uint32_t) { return DataType::kU32; }
+  static DataType type_of(Half) { return DataType::kF16; }
 
   std::vector<BlobPart>& blobs_;
   Status status_;
 };
 
-void add_float_weights(const Network& network, const std::vector<ValueShape>& shapes, PartList& list) {
+void add_float_weights(const std::string& prefix, const Network& network, const std::vector<ValueShape>& shapes, PartList& list) {
   for (size_t i = 0; i < network.layers.size(); ++i) {
     const Layer& layer = network.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
-    const std::string name = "network." + std::to_string(i);
+    const std::string name = prefix + "." + std::to_string(i);
     list.add(name + ".weights", layer.weights, {layer.kernel, layer.kernel, shapes[layer.inputs[0]].channels}, layer.out_channels);
     list.add(name + ".bias", layer.bias, {}, layer.out_channels);
   }
@@ -99,7 +102,7 @@ Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget, cons
   if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
   PartList list(parts.blobs);
   list.add("avatar.shape", avatar.shape);
-  if (has_floats) add_float_weights(avatar.network, *shapes, list);
+  if (has_floats) add_float_weights("network", avatar.network, *shapes, list);
   if (!avatar.fixed_point.empty()) {
     parts.required_features |= kFeatureFixedPoint;
     if (avatar.fixed_point.convolutions.size() != avatar.network.layers.size()) {
@@ -125,6 +128,43 @@ Result<PackageParts> take_apart(const Motion& motion, const Provenance& provenan
   PartList list(parts.blobs);
   list.add("motion.root_translation", motion.root_translation_m, {3}, motion.frame_count);
   list.add("motion.rotations", motion.rotations, {static_cast<uint32_t>(motion.joint_names.size()), 4}, motion.frame_count);
+  if (!list.status().ok()) return list.status();
+  return parts;
+}
+
+Result<PackageParts> take_apart(const Population& population, const Budget& budget, const Provenance& provenance,
+                                std::span<const Provenance> own) {
+  const Population& p = population;
+  PackageParts parts{.kind = PackageKind::kPopulation, .content = &p, .budget = budget, .provenance = provenance, .member_provenance = own};
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(p.network, true);
+  if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
+  if (p.members.empty() || own.size() != p.size())
+    return Status(StatusCode::kInvalidArgument, "population.members: none, or not one provenance each");
+  uint32_t weights = 0, rows = 0, convolutions = 0;
+  for (const Layer& layer : p.network.layers) {
+    weights += static_cast<uint32_t>(layer.weights.size());
+    rows += static_cast<uint32_t>(layer.bias.size());
+    convolutions += layer.op == LayerOp::kConv2d;
+  }
+  PartList list(parts.blobs);
+  add_float_weights("initial", p.network, *shapes, list);
+  const auto members = p.size();
+  const auto row_of = [&](const auto& array) { return static_cast<uint32_t>(array.size() / members); };
+  if (!p.shape.empty()) list.add("population.shape", p.shape, {row_of(p.shape)}, members);
+  list.add("population.bias", p.bias, {rows}, members);
+  if (p.coding == DifferenceCoding::kInt8) {
+    list.add("population.scale", p.scale, {rows}, members);
+    list.add("population.frequency", p.frequency, {uint32_t{kRansValues}}, convolutions);
+    list.add("population.code", p.code);
+    list.add("population.code_end", p.code_end, {}, members);
+  } else {
+    list.add("population.difference", p.difference, {weights}, members);
+  }
+  if (const auto features = static_cast<uint32_t>(3 * p.pose_joints.size()); features != 0) {
+    list.add("pose.mean", p.pose_mean, {features}, members);
+    list.add("pose.factor", p.pose_factor, {features * (features + 1) / 2}, members);
+  }
+  if (!p.golden_poses.empty()) list.add("golden.rotations", p.golden_poses, {row_of(p.golden_poses) / 4, 4}, members);
   if (!list.status().ok()) return list.status();
   return parts;
 }

@@ -25,9 +25,11 @@ struct PackageParts {
   PackageKind kind = PackageKind::kBody;
   uint64_t required_features = 0;
   uint64_t optional_features = 0;
-  std::variant<const Body*, const Avatar*, const Motion*> content;  // borrowed; their arrays are taken from the blobs alone
+  std::variant<const Body*, const Avatar*, const Motion*, const Population*>
+      content;  // borrowed; their arrays are taken from the blobs alone
   Budget budget;
   Provenance provenance;
+  std::span<const Provenance> member_provenance;  // of a population; borrowed
   std::vector<BlobPart> blobs;
 };
 
@@ -35,6 +37,8 @@ struct PackageParts {
 Result<PackageParts> take_apart(const Body& body, const Provenance& provenance);
 Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget, const Provenance& provenance);
 Result<PackageParts> take_apart(const Motion& motion, const Provenance& provenance);
+Result<PackageParts> take_apart(const Population& population, const Budget& budget, const Provenance& provenance,
+                                std::span<const Provenance> own);
 
 // Header, index and blobs, sealed. The same parts give the same bytes.
 std::vector<std::byte> assemble(const PackageParts& parts);

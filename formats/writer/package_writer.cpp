@@ -42,4 +42,9 @@ Result<std::vector<std::byte>> write_package(const Motion& motion, const Provena
   return assemble_and_verify(take_apart(motion, provenance), describe("motion", motion.name));
 }
 
+Result<std::vector<std::byte>> write_package(const Population& population, const Budget& budget, const Provenance& provenance,
+                                             std::span<const Provenance> own) {
+  return assemble_and_verify(take_apart(population, budget, provenance, own), describe("population", population.name));
+}
+
 }  // namespace figurine

@@ -30,5 +30,8 @@ class AlignedBytes {
 Result<std::vector<std::byte>> write_package(const Body& body, const Provenance& provenance);
 Result<std::vector<std::byte>> write_package(const Avatar& avatar, const Budget& budget, const Provenance& provenance);
 Result<std::vector<std::byte>> write_package(const Motion& motion, const Provenance& provenance);
+// own: one for each member, what its provenance has beside the package's (population_writer.h makes all four).
+Result<std::vector<std::byte>> write_package(const Population& population, const Budget& budget, const Provenance& provenance,
+                                             std::span<const Provenance> own);
 
 }  // namespace figurine

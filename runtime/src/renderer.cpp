@@ -134,11 +134,15 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
 Result<AvatarId> Renderer::add_avatar(const Package& avatar, const Package& body, std::optional<Precision> precision) {
   if (avatar.kind() != PackageKind::kAvatar)
     return Status(StatusCode::kMismatch, std::string("an avatar is wanted, not a ") + to_string(avatar.kind()));
+  return add_avatar(avatar.avatar(), body, precision);
+}
+
+Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body, std::optional<Precision> precision) {
   if (body.kind() != PackageKind::kBody)
     return Status(StatusCode::kMismatch, std::string("a body is wanted, not a ") + to_string(body.kind()));
-  FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar.avatar(), body));
-  const Precision held = avatar.avatar().holds(Precision::kFixedPoint) ? Precision::kFixedPoint : Precision::kFloat32;
-  Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(avatar.avatar(), body.body(), precision.value_or(held), impl_->pool);
+  FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar, body));
+  const Precision held = avatar.holds(Precision::kFixedPoint) ? Precision::kFixedPoint : Precision::kFloat32;
+  Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(avatar, body.body(), precision.value_or(held), impl_->pool);
   if (!posed.ok()) return posed.status();
   if (!impl_->gaussians.ensure(body.body().texel_count(), (*posed)->sh_degree())) return out_of_memory("an avatar's Gaussians");
   impl_->avatars.push_back(std::move(posed).value());

@@ -80,7 +80,7 @@ Status open_lane(const BenchOptions& options, RendererOptions renderer_options, 
   lane.renderer = std::move(*renderer);
   FIG_RETURN_IF_ERROR(lane.cast->add_to(*lane.renderer, lane.precision));
   first.prepare_ms = ms_since(start_ns);
-  const Camera& camera = lane.cast->avatar(0).package.avatar().golden.camera;
+  const Camera& camera = lane.cast->avatar(0).avatar.golden.camera;
   RenderedFrame frame({camera.width_px, camera.height_px}, PixelFormat::kRgba8);
   start_ns = now_ns();
   FIG_RETURN_IF_ERROR(lane.renderer->render({.camera = camera, .avatars = lane.cast->pose(0)}, frame.target()));
@@ -91,11 +91,11 @@ Status open_lane(const BenchOptions& options, RendererOptions renderer_options, 
 // What is asked for; otherwise all that the avatar holds, the renderer's own choice first.
 Result<std::vector<Precision>> choose_precisions(const BenchOptions& options) {
   if (const std::optional<Precision> asked = options.device.network_precision()) return std::vector<Precision>{*asked};
-  const Result<std::unique_ptr<LoadedPackage>> avatar = load_package(options.cast.avatars[0], PackageKind::kAvatar);
+  const Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.cast.avatars[0]);
   if (!avatar.ok()) return avatar.status();
   std::vector<Precision> precisions;
   for (const Precision precision : {Precision::kFixedPoint, Precision::kFloat32}) {
-    if ((*avatar)->package.avatar().holds(precision)) precisions.push_back(precision);
+    if ((*avatar)->avatar.holds(precision)) precisions.push_back(precision);
   }
   return precisions;
 }
@@ -201,7 +201,7 @@ Status run_bench(const BenchOptions& options) {
   json["date"] = date_utc();
   json["machine"] = json_machine(options.device, renderer_options->threads, to_string(lanes[0].precision));
   json["avatar"] = options.cast.avatars[0];
-  json["avatar_bytes"] = lanes[0].cast->avatar(0).package.size_bytes();
+  json["avatar_bytes"] = lanes[0].cast->avatar(0).package->package.size_bytes();
   json["body_bytes"] = lanes[0].cast->body(0).package.size_bytes();
   json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(options.cast.motions[0]);
   json["frames"] = options.frames;
@@ -231,7 +231,10 @@ Command add_bench_command(CLI::App& app) {
   auto options = std::make_shared<BenchOptions>();
   CLI::App* command = app.add_subcommand("bench", "Measures what a frame costs on this machine");
   options->cast.avatars.resize(1);
-  command->add_option("avatar", options->cast.avatars[0], "avatar package (.fgn)")->required();
+  command
+      ->add_option("avatar", options->cast.avatars[0],
+                   "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+      ->required();
   command->add_option("--body", options->cast.body,
                       "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
   command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose, swaying")->expected(1);

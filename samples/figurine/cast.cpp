@@ -38,11 +38,11 @@ Result<Cast> Cast::load(const CastOptions& options) {
   Cast cast;
   for (size_t i = 0; i < count; ++i) {
     Member member;
-    Result<std::unique_ptr<LoadedPackage>> avatar = load_package(options.avatars[i], PackageKind::kAvatar);
+    Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.avatars[i]);
     if (!avatar.ok()) return avatar.status();
     member.avatar = std::move(*avatar);
     for (const Member& other : cast.members_) {  // one body in memory, however many wear it
-      if (options.body.empty() && other.body->package.content_hash() == member.avatar->package.avatar().body_hash) member.body = other.body;
+      if (options.body.empty() && other.body->package.content_hash() == member.avatar->avatar.body_hash) member.body = other.body;
     }
     if (!member.body) {
       Result<std::unique_ptr<LoadedPackage>> body = find_body(*member.avatar, options.body);
@@ -68,7 +68,7 @@ Result<Cast> Cast::load(const CastOptions& options) {
       if (!place.ok()) return place.status();
       member.place = *place;
     }
-    member.rest_root_m = rest_root(member.avatar->package.avatar(), body);
+    member.rest_root_m = rest_root(member.avatar->avatar, body);
     member.rotations.resize(size_t(body.joint_count()) * 4);
     cast.members_.push_back(std::move(member));
   }
@@ -90,8 +90,8 @@ Result<std::vector<uint32_t>> Cast::frames(const FrameRange& range) const {
 
 Status Cast::add_to(Renderer& renderer, std::optional<Precision> precision) {
   for (size_t i = 0; i < members_.size(); ++i) {
-    const Result<AvatarId> id = renderer.add_avatar(members_[i].avatar->package, members_[i].body->package, precision);
-    if (!id.ok()) return id.status().within(members_[i].avatar->path);
+    const Result<AvatarId> id = renderer.add_avatar(members_[i].avatar->avatar, members_[i].body->package, precision);
+    if (!id.ok()) return id.status().within(members_[i].avatar->name);
     posed_[i].avatar = *id;
   }
   return {};
@@ -105,8 +105,7 @@ std::string Cast::precision(const Renderer& renderer) const {
 }
 
 bool Cast::holds(Precision precision) const {
-  return std::all_of(members_.begin(), members_.end(),
-                     [&](const Member& member) { return member.avatar->package.avatar().holds(precision); });
+  return std::all_of(members_.begin(), members_.end(), [&](const Member& member) { return member.avatar->avatar.holds(precision); });
 }
 
 std::span<const FrameAvatar> Cast::pose(uint32_t frame) {
@@ -115,7 +114,7 @@ std::span<const FrameAvatar> Cast::pose(uint32_t frame) {
     if (member.motion) {
       place_member(i, member.motion->package.motion().pose(frame));
     } else {
-      const GoldenFrame& golden = member.avatar->package.avatar().golden;
+      const GoldenFrame& golden = member.avatar->avatar.golden;
       place_member(i, {golden.root_translation_m, golden.rotations});
     }
   }

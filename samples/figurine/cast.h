@@ -31,7 +31,7 @@ class Cast {
   bool moves() const { return frame_count_ > 1; }
   uint32_t frame_count() const { return frame_count_; }  // of the shortest motion; 1 without
   float frames_per_second() const { return frames_per_second_; }
-  const LoadedPackage& avatar(size_t member) const { return *members_[member].avatar; }
+  const LoadedAvatar& avatar(size_t member) const { return *members_[member].avatar; }
   const LoadedPackage& body(size_t member) const { return *members_[member].body; }
   // The frames of the range that exist. kInvalidArgument if it reaches beyond the motion.
   Result<std::vector<uint32_t>> frames(const FrameRange& range) const;
@@ -54,7 +54,8 @@ class Cast {
 
  private:
   struct Member {
-    std::shared_ptr<LoadedPackage> avatar, body, motion;
+    std::shared_ptr<LoadedAvatar> avatar;
+    std::shared_ptr<LoadedPackage> body, motion;
     Placement place;
     std::array<float, 3> rest_root_m{0, 0, 0};  // of the template that the Gaussians sit on
     std::vector<float> rotations;               // [J,4] of the last pose

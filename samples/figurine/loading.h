@@ -1,4 +1,4 @@
-// Packages from files: opened by memory map, checked for their kind, bodies found for avatars.
+// Packages from files: opened by memory map, checked for their kind, avatars also out of populations, bodies found for avatars.
 #pragma once
 
 #include <memory>
@@ -21,9 +21,21 @@ struct LoadedPackage {
 // kNotFound, kCorrupt... as the file and the reader say; kInvalidArgument names both kinds if it is another one than wanted.
 Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted);
 
+// An avatar from a package of its own, or a member of a population.
+struct LoadedAvatar {
+  std::string name;                        // as it was asked for: "person.fgn", "people.fgn#17"
+  std::unique_ptr<LoadedPackage> package;  // that it came from
+  std::vector<float> storage;              // of a member's weights
+  Avatar avatar;                           // points into both
+};
+
+// "PATH" of an avatar, or "PATH#MEMBER" of a population, MEMBER a name or a number counted from 0. One line says so if the package is of
+// the other kind or has no such member.
+Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name);
+
 // The body that an avatar was made for: body_option if given (it must be the right one), else the .fgn files beside the avatar, else those
 // of the folders in FIGURINE_PATH (colon-separated). Found by content hash, whatever the file is called. Errors name the hash that is
 // wanted and the hashes that were found.
-Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedPackage& avatar, const std::string& body_option);
+Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar, const std::string& body_option);
 
 }  // namespace figurine::samples

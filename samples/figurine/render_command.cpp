@@ -151,7 +151,9 @@ Status run_render(const RenderOptions& options) {
 Command add_render_command(CLI::App& app) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = app.add_subcommand("render", "Renders avatars to images or video");
-  command->add_option("avatars", options->cast.avatars, "avatar packages (.fgn)")->required();
+  command
+      ->add_option("avatars", options->cast.avatars, "avatar packages (.fgn), or members of populations (people.fgn#NAME, people.fgn#17)")
+      ->required();
   command->add_option("--body", options->cast.body,
                       "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
   command->add_option("--motion", options->cast.motions, "motion packages: one for all avatars, or one for each")->expected(1)->take_all();

@@ -347,7 +347,10 @@ Command add_report_command(CLI::App& app) {
   auto options = std::make_shared<ReportOptions>();
   CLI::App* command = app.add_subcommand("report", "Plots error against run time: report.json and report.html");
   options->cast.avatars.resize(1);
-  command->add_option("avatar", options->cast.avatars[0], "avatar package (.fgn)")->required();
+  command
+      ->add_option("avatar", options->cast.avatars[0],
+                   "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+      ->required();
   command->add_option("--body", options->cast.body,
                       "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
   command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose, swaying")->expected(1);

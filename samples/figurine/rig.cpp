@@ -65,7 +65,7 @@ Result<std::vector<Point>> sample_points(std::span<const uint32_t> frames, std::
 }  // namespace
 
 Result<std::vector<Camera>> place_cameras(const RigOptions& options, std::span<const uint32_t> frames, Cast& cast, Renderer& renderer) {
-  const Camera& golden = cast.avatar(0).package.avatar().golden.camera;
+  const Camera& golden = cast.avatar(0).avatar.golden.camera;
   if (options.camera.fixed) {
     Camera camera = *options.camera.fixed;
     ImageSize size{camera.width_px, camera.height_px};

@@ -61,7 +61,7 @@ struct Golden {
 Result<Golden> draw_golden(const SelftestOptions& options, const RendererOptions& renderer_options, Precision precision) {
   Result<Cast> cast = Cast::load(options.cast);
   if (!cast.ok()) return cast.status();
-  const GoldenFrame& golden = cast->avatar(0).package.avatar().golden;
+  const GoldenFrame& golden = cast->avatar(0).avatar.golden;
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
   if (!renderer.ok()) return renderer.status();
   FIG_RETURN_IF_ERROR(cast->add_to(**renderer, precision));
@@ -124,9 +124,9 @@ Result<Verdict> compare_hashes(const SelftestOptions& options, const RendererOpt
 // In every precision asked for that the package has a golden picture of.
 Result<std::vector<Verdict>> judge(const SelftestOptions& options, const RendererOptions& renderer_options) {
   const std::string& path = options.cast.avatars[0];
-  const Result<std::unique_ptr<LoadedPackage>> loaded = load_package(path, PackageKind::kAvatar);
+  const Result<std::unique_ptr<LoadedAvatar>> loaded = load_avatar(path);
   if (!loaded.ok()) return loaded.status();
-  const Avatar& avatar = (*loaded)->package.avatar();
+  const Avatar& avatar = (*loaded)->avatar;
   const std::optional<Precision> asked = options.device.network_precision();
   const auto wanted = [&](Precision precision) { return asked ? *asked == precision : avatar.holds(precision); };
   std::vector<Verdict> verdicts;
@@ -172,7 +172,10 @@ Command add_selftest_command(CLI::App& app) {
   auto options = std::make_shared<SelftestOptions>();
   CLI::App* command = app.add_subcommand("selftest", "Compares this device's picture of the golden frame with the package's");
   options->cast.avatars.resize(1);
-  command->add_option("avatar", options->cast.avatars[0], "avatar package (.fgn)")->required();
+  command
+      ->add_option("avatar", options->cast.avatars[0],
+                   "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+      ->required();
   command->add_option("--body", options->cast.body,
                       "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
   options->device.add_to(*command);

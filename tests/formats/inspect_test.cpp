@@ -64,7 +64,7 @@ void expect_refused(const Outcome& run, const std::string& words) {
 }
 
 TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
-  for (const std::string kind : {"body", "avatar", "fixed_point_avatar", "motion"}) {
+  for (const std::string kind : {"body", "avatar", "fixed_point_avatar", "motion", "population", "half_population"}) {
     const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");
@@ -93,6 +93,23 @@ TEST(Inspect, PrintsWhatADeviceNeedsToKnow) {
   for (const char* words : {"0 pelvis  1 spine1  2 head", "rest pose", "8x8 texels, 5 covered, 3 border", "body.texel_weights", "[5,8]"}) {
     EXPECT_TRUE(contains(body.out, words)) << words << "\n" << body.out;
   }
+}
+
+TEST(Inspect, ListsThePopulationsMembers) {
+  const Outcome run = inspect("population_v1.fgn --tensors");
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  for (const char* words :
+       {"members           3: 1 train, 1 validation, 1 test", "int8, one scale an output channel, entropy-coded", "853 parameters",
+        "number  name     split           bytes  psnr_pose_db  psnr_view_db", "not stated here; each member has its own",
+        "0  000000   train             831", "27.50             -", "1  000001   validation", "28.50         28.25",
+        "2  m\xC3\xBCller   test", "population.code", "initial.0.weights", "pose.factor               f16  [3,6]"}) {
+    EXPECT_TRUE(contains(run.out, words)) << words << "\n" << run.out;
+  }
+  EXPECT_TRUE(contains(inspect("half_population_v1.fgn").out, "16-bit floats"));
+  const Outcome diff = inspect("population_v1.fgn --diff half_population_v1.fgn");
+  EXPECT_TRUE(contains(diff.out, "/population/coding: \"q8\" -> \"f16\"")) << diff.out;
+  EXPECT_TRUE(contains(diff.out, "population.difference: only in b")) << diff.out;
+  EXPECT_TRUE(contains(inspect("population_v1.fgn --diff population_v1.fgn").out, "the same content"));
 }
 
 TEST(Inspect, RefusesUnsoundPackagesWithOneLine) {

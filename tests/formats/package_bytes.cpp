@@ -152,6 +152,19 @@ bool exercise_avatar(const Avatar& avatar, std::string& reason) {
          validate_pose({avatar.golden.root_translation_m, avatar.golden.rotations}, joints).ok();
 }
 
+// Every member as an avatar, in storage that ends where its floats end.
+bool exercise_population(const Population& population, std::string& reason) {
+  const size_t floats = member_floats(population);
+  for (size_t m = 0; m < population.size(); ++m) {
+    const ExactBytes storage(std::vector<std::byte>(floats * sizeof(float)));
+    const Avatar avatar = open_member(population, m, {reinterpret_cast<float*>(storage.bytes().data()), floats});
+    if (!exercise_avatar(avatar, reason)) return false;
+    reason = "a member's name or quality";
+    if (find_member(population, avatar.name) != m || population.members[m].quality.size() != population.quality_names.size()) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 bool exercise(const Package& package, std::string& reason) {
@@ -167,6 +180,10 @@ bool exercise(const Package& package, std::string& reason) {
         if (!validate_pose(motion.pose(frame), static_cast<uint32_t>(motion.joint_names.size())).ok()) return false;
       }
       return true;
+    }
+    case PackageKind::kPopulation: {
+      for (size_t m = 0; m < package.population().size(); ++m) static_cast<void>(package.member_provenance(m));
+      return exercise_population(package.population(), reason);
     }
   }
   reason = "an unknown kind";

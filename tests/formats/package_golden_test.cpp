@@ -44,7 +44,9 @@ TEST(PackageGolden, TodaysReaderReadsTheGoldenBytes) {
   const std::pair<SampleKind, const char*> expected[] = {{SampleKind::kBody, "8b8f9367898ad7d574f353e6b0b69ae7"},
                                                          {SampleKind::kAvatar, "df4f0fdc16bf4abc2a392347c9560484"},
                                                          {SampleKind::kFixedPointAvatar, "5f5e04dbda2fb6ac6e9152773c882959"},
-                                                         {SampleKind::kMotion, "4c9a33c1c2bc8e307e13fe60efd5964d"}};
+                                                         {SampleKind::kMotion, "4c9a33c1c2bc8e307e13fe60efd5964d"},
+                                                         {SampleKind::kPopulation, "07e8b960a4b16e5b3edda84e1d2b9838"},
+                                                         {SampleKind::kHalfPopulation, "9534fbbf8f780e60bf2c31480e6a566a"}};
   for (const auto& [kind, hash] : expected) {
     const samples::ExactBytes bytes(read_golden(kind));
     const Result<Package> package = Package::open(bytes.bytes(), golden_path(kind));

@@ -120,14 +120,14 @@ TEST_P(PackageOpen, RejectsEachUnknownRequiredFeatureAndIgnoresOptionalOnes) {
 
 TEST_P(PackageOpen, RejectsOtherKinds) {
   const uint32_t own = uint32_t(samples::package_kind(GetParam()));
-  for (uint32_t kind : {0u, 1u, 2u, 3u, 4u, 5u, UINT32_MAX}) {
+  for (uint32_t kind : {0u, 1u, 2u, 3u, 4u, 5u, 6u, UINT32_MAX}) {
     Bytes bytes = sound();
     layout::Header header = get_header(bytes);
     header.kind = kind;
     put_header(bytes, header);
     if (kind == own) {
       EXPECT_TRUE(open_status(bytes).ok());
-    } else if (kind >= 1 && kind <= 3) {
+    } else if (kind >= 1 && kind <= 4) {
       expect_refused(open_status(bytes), StatusCode::kCorrupt, "index.content");
     } else {
       expect_refused(open_status(bytes), StatusCode::kUnsupported, "header.kind");
@@ -300,7 +300,7 @@ TEST(PackageBlobs, RejectsOtherShapesAndTypesOfKnownBlobs) {
   expect_refused(with({3, 8}, DataType::kF32), StatusCode::kCorrupt, "motion.rotations: has shape [3,8], expected [3,2,4]");
   expect_refused(with({2, 3, 4}, DataType::kF32), StatusCode::kCorrupt, "motion.rotations: has shape");
   expect_refused(with({3, 2, 4}, DataType::kU32), StatusCode::kCorrupt, "motion.rotations: is u32, not f32");
-  expect_refused(with({3, 2, 4}, static_cast<DataType>(6)), StatusCode::kUnsupported, "element type 6 is unknown");
+  expect_refused(with({3, 2, 4}, static_cast<DataType>(7)), StatusCode::kUnsupported, "element type 7 is unknown");
 }
 
 TEST(PackageLimits, RejectsIndicesThatCostTooMuch) {

@@ -142,8 +142,37 @@ FixedPointAvatarSample& FixedPointAvatarSample::with_floats() {
   return *this;
 }
 
+PopulationSample::PopulationSample(DifferenceCoding coding) : initial(std::make_unique<AvatarSample>()) {
+  for (size_t m = 0; m < 3; ++m) {
+    AvatarSample& sample = *avatars.emplace_back(std::make_unique<AvatarSample>());
+    sample.avatar.name = m == 2 ? "m\xC3\xBCller" : "00000" + std::to_string(m);
+    sample.shape[0] += static_cast<float>(m);
+    sample.avatar.map_statistics.mean[1] = 0.125f * static_cast<float>(m);
+    sample.golden_rotations[4] = 0.5f * static_cast<float>(m);
+    sample.avatar.golden.camera.cx_px += static_cast<float>(m);
+    sample.pose_mean[0] = 0.25f * static_cast<float>(m);
+    for (size_t i = 0; i < sample.weights.size(); ++i) {
+      // Multiples of 2^-10 times 0 to 16: exact, and one row in three does not differ at all.
+      for (size_t k = 0; k < sample.weights[i].size(); ++k) {
+        if (k % 3 != m) sample.weights[i][k] += 0x1p-10f * static_cast<float>(int((k * 5 + i) % 33) - 16);
+      }
+      for (float& bias : sample.biases[i]) bias += 0.0625f * static_cast<float>(m);
+    }
+    Provenance& own = provenance.emplace_back(make_provenance());
+    own.settings.push_back({"data.seed", std::to_string(m)});
+    own.quality = {{"psnr_pose_db", 27.5 + static_cast<double>(m)}};
+    if (m == 1) own.quality.push_back({"psnr_view_db", 28.25});
+    if (m == 2) own.licence_name = "CC-BY-4.0";
+  }
+  population = {
+      .name = "sample population", .initial = initial->avatar.network, .coding = coding, .members = {}, .budget = initial->budget};
+  for (size_t m = 0; m < 3; ++m) population.members.push_back({&avatars[m]->avatar, &provenance[m], static_cast<Split>(m)});
+}
+
 std::string to_string(SampleKind kind) {
-  return kind == SampleKind::kFixedPointAvatar ? "fixed_point_avatar" : figurine::to_string(package_kind(kind));
+  if (kind == SampleKind::kFixedPointAvatar) return "fixed_point_avatar";
+  if (kind == SampleKind::kHalfPopulation) return "half_population";
+  return figurine::to_string(package_kind(kind));
 }
 
 PackageKind package_kind(SampleKind kind) {
@@ -155,6 +184,9 @@ PackageKind package_kind(SampleKind kind) {
       return PackageKind::kAvatar;
     case SampleKind::kMotion:
       return PackageKind::kMotion;
+    case SampleKind::kPopulation:
+    case SampleKind::kHalfPopulation:
+      return PackageKind::kPopulation;
   }
   return {};
 }
@@ -169,6 +201,10 @@ Result<std::vector<std::byte>> write_sample(SampleKind kind) {
       return FixedPointAvatarSample().write();
     case SampleKind::kMotion:
       return MotionSample().write();
+    case SampleKind::kPopulation:
+      return PopulationSample(DifferenceCoding::kInt8).write();
+    case SampleKind::kHalfPopulation:
+      return PopulationSample(DifferenceCoding::kHalf).write();
   }
   return Status(StatusCode::kInvalidArgument, "no such sample");
 }

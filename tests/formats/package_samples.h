@@ -5,11 +5,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "figurine/package.h"
 #include "formats/writer/package_writer.h"
+#include "formats/writer/population_writer.h"
 
 namespace figurine::samples {
 
@@ -54,6 +56,18 @@ struct FixedPointAvatarSample : AvatarSample {
   FixedPointAvatarSample& with_floats();
 };
 
+// Three avatars of one network, each a little different from common initial weights: one population, in integers or in halves.
+struct PopulationSample {
+  explicit PopulationSample(DifferenceCoding coding = DifferenceCoding::kInt8);
+  PopulationSample(const PopulationSample&) = delete;
+  std::unique_ptr<AvatarSample> initial;               // whose weights are the common ones
+  std::vector<std::unique_ptr<AvatarSample>> avatars;  // [3]
+  std::vector<Provenance> provenance;                  // [3]
+  NewPopulation population;
+
+  Result<std::vector<std::byte>> write() const { return write_population(population); }
+};
+
 struct MotionSample {
   MotionSample();
   MotionSample(const MotionSample&) = delete;
@@ -64,8 +78,9 @@ struct MotionSample {
 };
 
 // One of each, for tests of what all packages have in common.
-enum class SampleKind { kBody, kAvatar, kFixedPointAvatar, kMotion };
-inline constexpr SampleKind kSampleKinds[] = {SampleKind::kBody, SampleKind::kAvatar, SampleKind::kFixedPointAvatar, SampleKind::kMotion};
+enum class SampleKind { kBody, kAvatar, kFixedPointAvatar, kMotion, kPopulation, kHalfPopulation };
+inline constexpr SampleKind kSampleKinds[] = {SampleKind::kBody,   SampleKind::kAvatar,     SampleKind::kFixedPointAvatar,
+                                              SampleKind::kMotion, SampleKind::kPopulation, SampleKind::kHalfPopulation};
 std::string to_string(SampleKind kind);  // also the name of its golden file: "fixed_point_avatar"
 PackageKind package_kind(SampleKind kind);
 Result<std::vector<std::byte>> write_sample(SampleKind kind);

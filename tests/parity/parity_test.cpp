@@ -5,9 +5,12 @@
 
 #include "ports/linux/png.h"
 #include "tests/toolchain/train/small_capture.h"
+#include "toolchain/evaluate/requantization.h"
 #include "toolchain/quantize/calibration.h"
+#include "toolchain/train/avatar_file.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
+#include "toolchain/train/pack_population.h"
 #include "toolchain/train/trainer.h"
 #include "toolchain/verify/parity.h"
 
@@ -45,7 +48,7 @@ void expect_parity(TemplateMode mode) {
   const PackedRun& packed = packed_run(mode);
   train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
   const train::PackageFile package = train::open_package(packed.path, PackageKind::kAvatar);
-  const ParityReport report = compare_with_runtime(avatar, package.package, {.views = 6});
+  const ParityReport report = compare_with_runtime(avatar, package.package.avatar(), {.views = 6});
   std::printf("parity %.2f dB, worst %.2f dB, largest error %.3g\n", report.psnr_db, report.worst_psnr_db, report.largest_error);
   ASSERT_EQ(report.views.size(), 6u);
   for (const ParityView& view : report.views) EXPECT_GT(view.foreground, 100u) << "the person is not in the picture";
@@ -96,13 +99,33 @@ TEST(Parity, InFixedPointIsAtLeast60dB) {
   const train::PackageFile file = train::open_package(path, PackageKind::kAvatar);
   EXPECT_FALSE(file.package.avatar().holds(Precision::kFloat32));
   EXPECT_LT(double(std::filesystem::file_size(path)), 0.6 * double(std::filesystem::file_size(packed.path)));  // nano: its index is half
-  const ParityReport report = compare_with_runtime(avatar, file.package, {.views = 6, .precision = Precision::kFixedPoint});
+  const ParityReport report = compare_with_runtime(avatar, file.package.avatar(), {.views = 6, .precision = Precision::kFixedPoint});
   std::printf("fixed point: %.2f dB, worst %.2f dB, largest error %.3g\n", report.psnr_db, report.worst_psnr_db, report.largest_error);
   EXPECT_GE(report.worst_psnr_db, kWanted_db);
   const train::PackageFile body = train::open_package(small_capture().body, PackageKind::kBody);
   const GoldenRun run = draw_golden_frame(file.package, body.package);
   EXPECT_NE(run.fixed_point_hash, (std::array<uint64_t, 2>{0, 0}));
   EXPECT_EQ(run.fixed_point_hash, draw_golden_frame(file.package, body.package).fixed_point_hash);
+}
+
+TEST(Population, OfARunCostsLessThanItMay) {
+  const PackedRun& packed = packed_run(TemplateMode::kShaped);
+  const std::string folder = std::filesystem::path(packed.path).parent_path();
+  for (const DifferenceCoding coding : {DifferenceCoding::kInt8, DifferenceCoding::kHalf}) {
+    const std::string path = folder + "/population.fgn";
+    const std::vector<std::byte> bytes = train::pack_population({.inputs = {packed.run}, .coding = coding, .quiet = true});
+    throw_if_error(ports::write_file_atomically(path, bytes), path);
+    train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
+    const train::AvatarFile member = train::open_avatar(path + "#" + capture::identity_name(0));
+    std::filesystem::remove(path);  // the map stays
+    const nlohmann::json report = evaluate::evaluate_requantization(avatar, member.avatar, {.quiet = true});
+    const ParityReport parity = compare_with_runtime(avatar, member.avatar, {.views = 6});
+    const double loss_db = report.at("poses").at("loss_db");
+    std::printf("%s: %zu bytes, loss %.4f dB, to the run's own pictures %.1f dB\n", to_string(coding), bytes.size(), loss_db,
+                parity.psnr_db);
+    EXPECT_LE(std::abs(loss_db), 0.2);
+    EXPECT_GE(parity.psnr_db, coding == DifferenceCoding::kInt8 ? 40 : 55);
+  }
 }
 
 TEST(Pack, IsTheSameBytesTwice) {

@@ -127,7 +127,7 @@ SyntheticBody make_test_body(const SyntheticBodyOptions& options) {
 SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvatarOptions& options) {
   Random random(options.seed + 1000);
   Avatar avatar;
-  avatar.name = "test avatar";
+  avatar.name = options.name;
   avatar.body_name = body.body().name;
   avatar.body_hash = body.package->content_hash();
   avatar.preset = "test";

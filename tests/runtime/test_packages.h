@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "figurine/package.h"
@@ -60,6 +61,7 @@ struct SyntheticAvatarOptions {
   std::vector<float> colour = {};  // empty: a random one per avatar; otherwise the head's mean colour
   uint64_t seed = 1;
   Held held = Held::kFloat32;
+  std::string name = "test avatar";
 };
 
 struct SyntheticAvatar {

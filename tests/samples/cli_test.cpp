@@ -85,6 +85,39 @@ TEST_F(Cli, RendersAnAvatarThatFillsThePicture) {
   EXPECT_EQ(folder_.names(), std::vector<std::string>{"x.png"});
 }
 
+TEST_F(Cli, RendersMembersOfAPopulationByNameAndByNumber) {
+  ASSERT_EQ(run("render P/people.fgn#bob --size 64x64 -o a.pfm").exit_code, 0);
+  const ProgramRun second = run("render P/people.fgn#1 --size 64x64 --json -o b.pfm");
+  ASSERT_EQ(second.exit_code, 0) << second.err;
+  EXPECT_TRUE(Json::parse(second.out)["avatars"][0].get<std::string>().ends_with("people.fgn#1"));
+  EXPECT_EQ(Json::parse(second.out)["machine"]["precision"], "f32");
+  EXPECT_EQ(folder_.read("a.pfm"), folder_.read("b.pfm"));
+  ASSERT_EQ(run("render P/people.fgn#ada --size 64x64 -o c.pfm").exit_code, 0);
+  EXPECT_NE(folder_.read("a.pfm"), folder_.read("c.pfm"));
+  ASSERT_EQ(run("render P/people.fgn#ada P/people.fgn#bob P/avatar.fgn --motion P/motion.fgn --size 64x48 -o d.png").exit_code, 0);
+  ASSERT_EQ(run("export P/people.fgn#0 -o x.ply").exit_code, 0);
+  ASSERT_EQ(run("bench P/people.fgn#ada --frames 2 --size 32x32 --json -").exit_code, 0);
+}
+
+TEST_F(Cli, SaysWhatIsWrongWithAMember) {
+  expect_refused("render P/people.fgn -o x.png", 1, "people.fgn: is a population: name one of its 2 members");
+  expect_refused("render P/people.fgn#2 -o x.png", 1,
+                 "people.fgn: member '2': there is none of this name, and its 2 members have the numbers 0 to 1");
+  expect_refused("export P/people.fgn#zoe -o x.ply", 1, "member 'zoe'");
+  expect_refused("bench P/people.fgn#", 1, "member ''");
+  expect_refused("render P/avatar.fgn#0 -o x.png", 1, "avatar.fgn: member '0': a package of kind avatar has no members");
+  expect_refused("render P/body.fgn#0 -o x.png", 1, "kind body has no members");
+  expect_refused("render P/nobody.fgn#0 -o x.png", 1, "nobody.fgn");
+  expect_refused("selftest P/people.fgn#0", 1, "golden frame: the package has nothing to compare with");
+  expect_refused("render P/people.fgn#0 --precision q8 -o x.png", 1, "people.fgn#0: avatar 'ada': its network is there in f32 alone");
+  expect_refused("render P/avatar.fgn --motion P/people.fgn -o x.png", 1, "of kind population, not motion");
+}
+
+TEST_F(Cli, AFileNameMayHaveAHash) {
+  folder_.write("who#0", packages_->read("avatar.fgn"));
+  EXPECT_EQ(run("render 'who#0' --body P/body.fgn --size 32x32 -o x.png").exit_code, 0);
+}
+
 TEST_F(Cli, OpaqueBackgroundGivesRgb) {
   ASSERT_EQ(run("render P/avatar.fgn --size 40x40 --background '#336699' -o x.png").exit_code, 0);
   const ImageU8 image = png("x.png");

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "formats/writer/package_writer.h"
+#include "formats/writer/population_writer.h"
 #include "runtime/test_packages.h"
 
 namespace figurine::tests {
@@ -102,6 +103,15 @@ void write_test_packages(const TestFolder& folder) {
   write_file(folder.path("both.fgn"), make_test_avatar(body, {.held = Held::kBoth}).bytes.bytes());
   write_file(folder.path("fixed.fgn"), make_test_avatar(body, {.held = Held::kFixedPoint}).bytes.bytes());
   write_file(folder.path("other_body.fgn"), other.bytes.bytes());
+
+  const SyntheticAvatar people[] = {make_test_avatar(body, {.seed = 5, .name = "ada"}), make_test_avatar(body, {.seed = 6, .name = "bob"})};
+  NewPopulation population{.name = "test people", .initial = avatar.package->avatar().network};
+  for (const SyntheticAvatar& person : people) {
+    population.members.push_back({&person.package->avatar(), &person.package->provenance(), Split::kTrain});
+  }
+  const Result<std::vector<std::byte>> packed = write_population(population);
+  FIG_CHECK(packed.ok(), packed.status().message().c_str());
+  write_file(folder.path("people.fgn"), *packed);
 
   constexpr uint32_t kFrames = 12;
   std::vector<float> translations, rotations;

@@ -49,8 +49,8 @@ ProgramRun run_shell(const std::string& command, const TestFolder& folder);
 void write_golden_avatar(const TestFolder& folder, const std::string& name, const std::string& png, Held held = Held::kFloat32,
                          const std::array<uint64_t, 2>& fixed_point_hash = {0, 0});
 
-// Writes body.fgn, the avatar in float (avatar.fgn), in fixed point (fixed.fgn) and in both (both.fgn), motion.fgn (12 frames, 30 a second)
-// and other_body.fgn, which does not fit the avatar.
+// Writes body.fgn, the avatar in float (avatar.fgn), in fixed point (fixed.fgn) and in both (both.fgn), motion.fgn (12 frames, 30 a
+// second), other_body.fgn, which does not fit the avatar, and people.fgn, a population of "ada" and "bob".
 void write_test_packages(const TestFolder& folder);
 
 }  // namespace figurine::tests

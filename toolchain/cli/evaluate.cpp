@@ -1,10 +1,11 @@
-// figurine-train evaluate: how good a trained avatar is (reconstruction), what fixed point costs it (quantization), and whether the device
-// draws the same (parity).
+// figurine-train evaluate: how good a trained avatar is (reconstruction), what fixed point (quantization) and a population's rounding
+// (population) cost it, and whether the device draws the same (parity).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -16,6 +17,8 @@
 #include "toolchain/evaluate/contact_sheet.h"
 #include "toolchain/evaluate/quantization.h"
 #include "toolchain/evaluate/reconstruction.h"
+#include "toolchain/evaluate/requantization.h"
+#include "toolchain/train/avatar_file.h"
 #include "toolchain/verify/parity.h"
 
 namespace figurine::cli {
@@ -27,9 +30,10 @@ struct EvaluateArguments {
   evaluate::ReconstructionOptions reconstruction;
   verify::ParityOptions parity;
   evaluate::QuantizationOptions quantization;
+  evaluate::RequantizationOptions requantization;
   quantize::FineTuneOptions fine_tune;
   bool no_qat = false;
-  std::vector<std::string> runs, packages;  // of quantization
+  std::vector<std::string> runs, packages;  // of quantization and population
   std::string precision = "f32", sheet, output, package;
 };
 
@@ -76,12 +80,12 @@ void run_reconstruction(const EvaluateArguments& arguments) {
 
 void run_parity(const EvaluateArguments& arguments) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
-  const train::PackageFile package = train::open_package(arguments.package, PackageKind::kAvatar);
-  const verify::ParityReport parity = verify::compare_with_runtime(avatar, package.package, arguments.parity);
+  const train::AvatarFile device = train::open_avatar(arguments.package);
+  const verify::ParityReport parity = verify::compare_with_runtime(avatar, device.avatar, arguments.parity);
   nlohmann::json report = report_head(arguments, avatar);
   report["package"] = arguments.package;
   report["precision"] = arguments.precision;
-  report["package_hash"] = format_hash(package.package.content_hash());
+  report["package_hash"] = format_hash(device.file.package.content_hash());
   report["parity_db"] = finite(parity.psnr_db);
   report["worst_parity_db"] = finite(parity.worst_psnr_db);
   report["largest_error"] = finite(parity.largest_error);
@@ -132,6 +136,40 @@ void run_quantization(const EvaluateArguments& arguments) {
   for (const nlohmann::json& row : report.at("rows")) print_row(row);
 }
 
+void run_population(const EvaluateArguments& arguments) {
+  constexpr double kMostLoss_db = 0.2;  // beyond it, a population is to be packed with --precision f16
+  nlohmann::json report{{"command", train::current_command()},
+                        {"commit", train::current_commit()},
+                        {"machine", train::describe_machine()},
+                        {"date", train::utc_now()},
+                        {"package", arguments.package}};
+  double worst = -std::numeric_limits<double>::infinity();
+  for (const std::string& run : arguments.runs) {
+    train::OpenRunOptions open = arguments.open;
+    open.run = run;
+    train::TrainedAvatar avatar = train::TrainedAvatar::open(open);
+    const std::string name = std::filesystem::path(avatar.data().directory()).filename().string();
+    const train::AvatarFile member = train::open_avatar(arguments.package + "#" + name);
+    nlohmann::json row{{"member", name}, {"run", run}};
+    row.update(evaluate::evaluate_requantization(avatar, member.avatar, arguments.requantization));
+    report["coding"] = to_string(member.file.package.population().coding);
+    report["package_bytes"] = member.file.package.size_bytes();
+    report["package_hash"] = format_hash(member.file.package.content_hash());
+    for (const char* group : {"views", "poses"}) {
+      const auto number = [&](const char* key) { return row.at(group).at(key).is_number() ? row.at(group).at(key).get<double>() : NAN; };
+      if (std::isfinite(number("loss_db"))) worst = std::max(worst, number("loss_db"));
+      std::printf("%-12s %-6s %6.2f dB, as a member %6.2f dB, loss %6.3f dB\n", name.c_str(), group, number("psnr_db"),
+                  number("member_psnr_db"), number("loss_db"));
+    }
+    report["members"].push_back(std::move(row));
+  }
+  report["worst_loss_db"] = finite(worst);
+  report["most_loss_db"] = kMostLoss_db;
+  report["passed"] = worst <= kMostLoss_db && std::isfinite(worst);
+  if (!arguments.output.empty()) train::write_json(arguments.output, report);
+  std::printf("worst loss %.3f dB: %s %.1f dB\n", worst, worst <= kMostLoss_db ? "within" : "ABOVE", kMostLoss_db);
+}
+
 void add_run_options(CLI::App* command, const std::shared_ptr<EvaluateArguments>& arguments) {
   command->add_option("--run", arguments->open.run, "Folder of a run")->required();
   command->add_option("--data", arguments->open.data, "Where the data is now (default: where the run found it)");
@@ -171,9 +209,21 @@ void add_evaluate_command(CLI::App& app) {
   quantization->add_option("-o,--output", arguments->output, "Report to write, JSON");
   quantization->callback([arguments] { run_quantization(*arguments); });
 
+  CLI::App* population = command->add_subcommand("population", "What a population's rounding costs its members, against the truth");
+  population->add_option("--package", arguments->package, "Population package")->required();
+  population->add_option("--run", arguments->runs, "Run of a member, which is called as its data's folder is; may be given several times")
+      ->required();
+  population
+      ->add_option("--view-frame-step", arguments->requantization.view_frame_step, "Look at every n-th training pose only (default 8)")
+      ->check(CLI::PositiveNumber);
+  population->add_flag("--quiet", arguments->requantization.quiet, "No progress");
+  population->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
+  population->add_option("-o,--output", arguments->output, "Report to write, JSON");
+  population->callback([arguments] { run_population(*arguments); });
+
   CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, before rounding to 8 bits");
   add_run_options(parity, arguments);
-  parity->add_option("--package", arguments->package, "Avatar package made from the run")->required();
+  parity->add_option("--package", arguments->package, "Avatar package made from the run, or PACKAGE#MEMBER of a population")->required();
   parity->add_option("--views", arguments->parity.views, "Held-out pictures to compare (default 12)")->check(CLI::PositiveNumber);
   parity->add_option("--precision", arguments->precision, "Of both (default f32)")->check(CLI::IsMember({"f32", "q8"}));
   parity->callback([arguments] {

@@ -1,4 +1,4 @@
-// figurine-train pack: a run as an avatar package.
+// figurine-train pack: a run as an avatar package, or many avatars as a population package.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -12,6 +12,7 @@
 #include "toolchain/quantize/fine_tune.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
+#include "toolchain/train/pack_population.h"
 #include "toolchain/verify/parity.h"
 
 namespace figurine::cli {
@@ -21,7 +22,10 @@ namespace {
 struct PackArguments {
   train::OpenRunOptions open;
   train::PackOptions pack;
-  std::string precision = "f32", output;
+  std::vector<std::string> inputs;
+  bool is_population = false;
+  train::PackPopulationOptions population;
+  std::string precision, output;
   bool fine_tune = false;
   quantize::FineTuneOptions fine_tuning;
 };
@@ -64,7 +68,19 @@ quantize::QuantisedNetwork quantise(const PackArguments& arguments, train::Train
   return quantised;
 }
 
-void run(PackArguments arguments) {
+void run_population(PackArguments arguments) {
+  train::PackPopulationOptions& options = arguments.population;
+  options.inputs = arguments.inputs;
+  options.coding = arguments.precision == "f16" ? DifferenceCoding::kHalf : DifferenceCoding::kInt8;
+  options.threads = arguments.open.threads;
+  if (!arguments.pack.name.empty()) options.name = arguments.pack.name;
+  const std::vector<std::byte> bytes = train::pack_population(options);
+  throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
+  std::printf("%s: %zu bytes\n", arguments.output.c_str(), bytes.size());
+}
+
+void run_avatar(PackArguments arguments) {
+  arguments.open.run = arguments.inputs.front();
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
   std::optional<quantize::QuantisedNetwork> quantised;
   if (arguments.precision != "f32") {
@@ -90,23 +106,44 @@ void run(PackArguments arguments) {
               static_cast<double>(options.peak_memory_bytes) / 1e3);
 }
 
+// What CLI11 cannot see: which options belong to which of the two.
+void run(const PackArguments& arguments) {
+  PackArguments chosen = arguments;
+  if (chosen.precision.empty()) chosen.precision = chosen.is_population ? "q8" : "f32";
+  const bool fits = chosen.is_population ? chosen.precision == "q8" || chosen.precision == "f16" : chosen.precision != "f16";
+  if (!fits) throw CLI::ValidationError("--precision", chosen.is_population ? "q8 or f16 with --population" : "f16 is for --population");
+  if (!chosen.is_population && chosen.inputs.size() != 1) throw CLI::ValidationError("RUN", "one; several are for --population");
+  chosen.is_population ? run_population(std::move(chosen)) : run_avatar(std::move(chosen));
+}
+
 }  // namespace
 
 void add_pack_command(CLI::App& app) {
   auto arguments = std::make_shared<PackArguments>();
   arguments->open.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
-  CLI::App* command = app.add_subcommand("pack", "Write a run's avatar as a package");
-  command->add_option("RUN", arguments->open.run, "Folder of a run")->required();
+  CLI::App* command = app.add_subcommand("pack", "Write a run's avatar as a package, or many as a population");
+  command->add_option("RUN", arguments->inputs, "Folder of a run; with --population also avatar packages, and folders of them")->required();
   command->add_option("-o,--output", arguments->output, "Package to write")->required();
   command->add_option("--data", arguments->open.data, "Where the data is now (default: where the run found it)");
   command->add_option("--body", arguments->open.body, "Where the body is now (default: where the run found it)");
-  command->add_option("--precision", arguments->precision, "Float weights, fixed point or both (default f32)")
-      ->check(CLI::IsMember({"f32", "q8", "f32,q8"}));
-  command->add_flag("--qat", arguments->fine_tune, "Fine-tune for fixed point first, in RUN/qat; the run's own weights stay");
+  command
+      ->add_option("--precision", arguments->precision,
+                   "Float weights, fixed point or both (default f32); of a population's differences q8 or f16 (default q8)")
+      ->check(CLI::IsMember({"f32", "q8", "f32,q8", "f16"}));
+  CLI::Option* population = command->add_flag("--population", arguments->is_population, "One package of many avatars of one network shape");
+  command
+      ->add_option("--init", arguments->population.init,
+                   "Weights or run that all members started from (default: the common initial weights)")
+      ->needs(population);
+  command->add_option("--split", arguments->population.split, "JSON of the lists train, validation and test (default: all members train)")
+      ->needs(population);
+  CLI::Option* qat =
+      command->add_flag("--qat", arguments->fine_tune, "Fine-tune for fixed point first, in RUN/qat; the run's own weights stay");
+  qat->excludes(population);
   command->add_option("--qat-iterations", arguments->fine_tuning.iterations, "Of the fine-tune (default 400)")->check(CLI::PositiveNumber);
   command->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
   command->add_flag("--golden,!--no-golden", arguments->pack.golden, "Carry an expected picture (default)");
-  command->add_option("--name", arguments->pack.name, "Name of the avatar (default: the identity's folder)");
+  command->add_option("--name", arguments->pack.name, "Name of the avatar (default: the identity's folder) or of the population");
   command->add_option("--licence", arguments->pack.licence_name, "Licence (synthetic persons: CC0-1.0)");
   command->add_option("--licence-url", arguments->pack.licence_url, "Where its text is");
   command->add_option("--author", arguments->pack.authors, "Who made it; may be given several times");

@@ -57,10 +57,10 @@ std::vector<std::pair<size_t, size_t>> choose_views(const dataset::Dataset& data
 
 }  // namespace
 
-ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Package& package, const ParityOptions& options) {
+ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Avatar& device, const ParityOptions& options) {
   const std::unique_ptr<Renderer> renderer = value_or_throw(Renderer::create({.threads = options.threads}), "runtime");
-  const AvatarId id = value_or_throw(renderer->add_avatar(package, avatar.body_file().package, options.precision), "runtime");
-  if (options.precision == Precision::kFixedPoint) quantize::imitate(package.avatar().fixed_point, avatar.model().unet());
+  const AvatarId id = value_or_throw(renderer->add_avatar(device, avatar.body_file().package, options.precision), "runtime");
+  if (options.precision == Precision::kFixedPoint) quantize::imitate(device.fixed_point, avatar.model().unet());
   const dataset::Dataset& data = avatar.data();
   ParityReport report;
   Errors pooled;

@@ -32,8 +32,9 @@ struct ParityOptions {
   Precision precision = Precision::kFloat32;  // in fixed point the trainer's UNet imitates the package's integers
 };
 
-// Throws InputError if the package is not of this run's body, does not hold the precision, or the runtime refuses it.
-ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Package& package, const ParityOptions& options);
+// device: the package's avatar, or a population's member. Throws InputError if it is not of this run's body, does not hold the precision,
+// or the runtime refuses it.
+ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Avatar& device, const ParityOptions& options);
 
 // What a device says of a package: its golden frame drawn by the runtime, in every precision that the package holds.
 struct GoldenRun {

@@ -18,6 +18,7 @@
 #include "figurine/avatar.h"
 #include "figurine/body.h"
 #include "figurine/motion.h"
+#include "figurine/population.h"
 #include "figurine/status.h"
 
 namespace figurine {
@@ -29,10 +30,10 @@ inline constexpr size_t kBlobAlignment = 64;
 // Bits of the header's required features.
 inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1} << 0;  // an avatar's network is there in fixed point
 
-enum class PackageKind : uint8_t { kBody = 1, kAvatar = 2, kMotion = 3 };
+enum class PackageKind : uint8_t { kBody = 1, kAvatar = 2, kMotion = 3, kPopulation = 4 };
 const char* to_string(PackageKind kind);
 
-enum class DataType : uint8_t { kF32 = 0, kU8 = 1, kI16 = 2, kU32 = 3, kI8 = 4, kI32 = 5 };
+enum class DataType : uint8_t { kF32 = 0, kU8 = 1, kI16 = 2, kU32 = 3, kI8 = 4, kI32 = 5, kF16 = 6 };
 const char* to_string(DataType type);
 size_t size_bytes(DataType type);
 
@@ -68,6 +69,12 @@ struct Provenance {
   std::string depicted_person;    // "synthetic", or how consent was given
 };
 
+// The texts of a provenance, of which a population's member may have its own.
+inline constexpr std::string Provenance::* kProvenanceTexts[] = {
+    &Provenance::tool,           &Provenance::created,           &Provenance::licence_name,
+    &Provenance::licence_url,    &Provenance::avatar_permission, &Provenance::commercial_usage,
+    &Provenance::depicted_person};
+
 // A tensor of the index, for the inspector and for --diff.
 struct TensorInfo {
   std::string name;
@@ -94,11 +101,14 @@ class Package {
   // XXH3-128 over header and index; the index holds every blob's checksum, so it names the whole content. (low, high)
   std::array<uint64_t, 2> content_hash() const;
 
-  const Body& body() const;      // kind must be kBody
-  const Avatar& avatar() const;  // kind must be kAvatar
-  const Motion& motion() const;  // kind must be kMotion
+  const Body& body() const;              // kind must be kBody
+  const Avatar& avatar() const;          // kind must be kAvatar
+  const Motion& motion() const;          // kind must be kMotion
+  const Population& population() const;  // kind must be kPopulation
   const Budget& budget() const;
   const Provenance& provenance() const;
+  // Of a population's member: the package's, with what is the member's own, its quality among it. kind must be kPopulation.
+  Provenance member_provenance(size_t member) const;
   const std::vector<TensorInfo>& tensors() const;
   uint64_t size_bytes() const;
 

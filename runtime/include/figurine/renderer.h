@@ -88,6 +88,9 @@ class Renderer {
   // Packs the network's weights and allocates what a frame of it needs. precision: fixed point if the avatar has it, otherwise float,
   // unless said. kMismatch if the avatar was made for another body; kUnsupported if it does not hold the precision.
   Result<AvatarId> add_avatar(const Package& avatar, const Package& body, std::optional<Precision> precision = std::nullopt);
+  // The same of an avatar that is no package of its own: a population's member (open_member). Its arrays are borrowed likewise; their
+  // meaning must have been verified, as open_member's is.
+  Result<AvatarId> add_avatar(const Avatar& avatar, const Package& body, std::optional<Precision> precision = std::nullopt);
   Precision precision(AvatarId avatar) const;  // of an avatar that was added
 
   // Draws one frame. kInvalidArgument on an unsound camera, pose, target or Gaussian count; nothing was drawn then. Gaussians that are not
