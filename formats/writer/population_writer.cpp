@@ -97,7 +97,7 @@ Kernels quantise(const Avatar& avatar, const Network& initial, std::vector<float
 }
 
 // Streams of all members, over one table of frequencies for each convolution.
-void encode(const std::vector<Kernels>& members, Storage& storage) {
+Status encode(const std::vector<Kernels>& members, Storage& storage) {
   std::vector<RansTable> tables;
   for (size_t c = 0; c < members.front().size(); ++c) {
     std::array<uint64_t, kRansValues> counts{};
@@ -112,8 +112,12 @@ void encode(const std::vector<Kernels>& members, Storage& storage) {
     std::vector<RansStretch> stretches;
     for (size_t c = 0; c < member.size(); ++c) stretches.push_back({member[c], &tables[c]});
     append(storage.code, std::span<const uint8_t>(encode_rans(stretches)));
+    if (storage.code.size() > std::numeric_limits<uint32_t>::max()) {
+      return Status(StatusCode::kLimitExceeded, "population: its streams are longer than 4 GiB");
+    }
     storage.code_end.push_back(static_cast<uint32_t>(storage.code.size()));
   }
+  return {};
 }
 
 Status add_halves(const NewMember& member, const Network& initial, std::vector<Half>& out) {
@@ -189,6 +193,9 @@ void take_quality(const NewPopulation& from, Population& to) {
 
 Status check(const NewPopulation& population) {
   if (population.members.empty()) return Status(StatusCode::kInvalidArgument, "population: has no members");
+  if (population.members.size() > kMaxMembers) {
+    return Status(StatusCode::kLimitExceeded, "population: has more than " + std::to_string(kMaxMembers) + " members");
+  }
   const Result<std::vector<ValueShape>> shapes = infer_shapes(population.initial, true);
   if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, "initial weights: " + shapes.status().message());
   for (const NewMember& member : population.members) FIG_RETURN_IF_ERROR(check_alike(member, population));
@@ -232,7 +239,7 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
     own.push_back(*member.provenance);
     if (from.progress && !from.progress(to.size())) return Status(StatusCode::kInterrupted, "population: interrupted, nothing was written");
   }
-  if (from.coding == DifferenceCoding::kInt8) encode(kernels, storage);
+  if (from.coding == DifferenceCoding::kInt8) FIG_RETURN_IF_ERROR(encode(kernels, storage));
   take_quality(from, to);
   Provenance shared = factor_out(own);
   shared.settings.insert(shared.settings.end(), from.settings.begin(), from.settings.end());

@@ -152,6 +152,11 @@ void add_pack_command(CLI::App& app) {
   command->add_option("--commercial", arguments->pack.commercial_usage, "Commercial use")
       ->check(CLI::IsMember({"personalNonProfit", "personalProfit", "corporation"}));
   command->add_option("--depicted-person", arguments->pack.depicted_person, "\"synthetic\", or how consent was given");
+  // What is a run's own is said when the run is packed.
+  for (const char* option : {"--data", "--body", "--golden", "--licence", "--licence-url", "--author", "--permission", "--commercial",
+                             "--depicted-person", "--qat-iterations"}) {
+    command->get_option(option)->excludes(population);
+  }
   command->callback([arguments] { run(*arguments); });
 }
 
