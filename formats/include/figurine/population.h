@@ -76,7 +76,7 @@ uint64_t difference_bytes(const Population& population, size_t member);
 size_t member_floats(const Population& population);
 
 // Member `member` as an avatar, in float alone. Its weights and its covariance are written to the storage, [member_floats], everything else
-// points into the package: both must outlive the view. Never fails on a population that a package opened with; half a millisecond at
+// points into the package: both must outlive the view. Never fails on a population that a package opened with; a millisecond at
 // `edge`.
 Avatar open_member(const Population& population, size_t member, std::span<float> storage);
 
