@@ -72,8 +72,7 @@ Session prepare(const CaptureRequest& request, uint32_t identity, const Package&
                 const std::vector<body::MotionClip>& motions) {
   const Body& body = package.body();
   Session session;
-  const PersonRequest person{
-      .seed = Random(request.seed, kIdentityStream).bits(identity), .garment = request.garment, .hair = request.hair};
+  const PersonRequest person{.seed = Random(request.seed, kIdentityStream).bits(identity), .limits = request.limits};
   session.person =
       makehuman != nullptr ? make_makehuman_person(person, *makehuman, request.makehuman, body) : make_mannequin_person(person, body);
   session.joints_m.resize(size_t{body.joint_count()} * 3);
@@ -88,6 +87,8 @@ Session prepare(const CaptureRequest& request, uint32_t identity, const Package&
                     .body_name = body.name,
                     .body_hash = format_hash(package.content_hash()),
                     .sources = request.sources,
+                    .folds = to_string(request.folds),
+                    .limits = request.limits,
                     .root_rest_m = root};
   if (makehuman != nullptr) session.record.sources.insert(session.record.sources.begin(), body::MakeHuman::source_line());
   return session;
@@ -121,7 +122,7 @@ class Tally {
 };
 
 // A frame is one piece of work: its pose is skinned and its ambient light gathered once for all cameras.
-void photograph(const Session& session, const IdentityLayout& layout, const Body& body, uint32_t threads, Tally& tally) {
+void photograph(const Session& session, const IdentityLayout& layout, const Body& body, FoldMode folds, uint32_t threads, Tally& tally) {
   std::atomic<size_t> next{0};
   const auto work = [&] {
     try {
@@ -130,7 +131,7 @@ void photograph(const Session& session, const IdentityLayout& layout, const Body
         bool posed = false;
         for (size_t camera = 0; camera < session.rig.size() && !tally.stopped(); ++camera) {
           if (!layout.has_image(frame, camera)) {
-            if (!renderer) renderer.emplace(session.person);
+            if (!renderer) renderer.emplace(session.person, folds);
             if (!posed) renderer->set_pose(session.transforms(frame, body));
             posed = true;
             layout.write_image(frame, camera, renderer->render(session.rig[camera].camera));
@@ -171,7 +172,7 @@ CaptureEnd capture_identities(const CaptureRequest& request, const Package& pack
     const Session session = prepare(request, identity, package, makehuman ? &*makehuman : nullptr, motions);
     IdentityLayout layout(request.output + "/" + identity_name(identity), session.record, session.person, session.rig, session.sequence);
     layout.begin(request.resume);
-    photograph(session, layout, body, request.threads, tally);
+    photograph(session, layout, body, request.folds, request.threads, tally);
     tally.rethrow();
     if (tally.stopped()) break;
     layout.finish();
@@ -179,21 +180,25 @@ CaptureEnd capture_identities(const CaptureRequest& request, const Package& pack
   return tally.stopped() ? CaptureEnd::kStopped : CaptureEnd::kComplete;
 }
 
-ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns, uint32_t rows) {
-  const dataset::Dataset data = dataset::Dataset::open(identity_directory);
-  const size_t frames = data.frames().size(), cameras = data.cameras().size(), cells = size_t{columns} * rows;
-  const Camera& size = data.cameras()[0].camera;
-  // The figure stands in the middle; the sides of a square image are empty.
-  const uint32_t cell_width = std::min(size.width_px, size.height_px * 5 / 8), cut = (size.width_px - cell_width) / 2;
-  ports::ImageU8 sheet(columns * cell_width, rows * size.height_px, 3);
-  constexpr uint32_t kGrey = 118;
-  for (size_t i = 0; i < cells; ++i) {
-    const dataset::CaptureImage image = data.load_image(i * frames / cells, (i * 7 + i / columns) % cameras);
-    for (uint32_t y = 0; y < size.height_px; ++y) {
-      for (uint32_t x = 0; x < cell_width; ++x) {
-        const size_t from = size_t{y} * size.width_px + x + cut;
-        uint8_t* to =
-            sheet.at(static_cast<uint32_t>(i % columns) * cell_width + x, static_cast<uint32_t>(i / columns) * size.height_px + y);
+namespace {
+
+// Cells of a sheet: images over mid-grey, cut to their middle, because the sides of a square image of a standing figure are empty.
+class Sheet {
+ public:
+  Sheet(uint32_t columns, uint32_t rows, const Camera& size)
+      : columns_(columns),
+        width_(std::min(size.width_px, size.height_px * 5 / 8)),
+        height_(size.height_px),
+        image_(columns * width_, rows * height_, 3) {
+    std::fill(image_.pixels.begin(), image_.pixels.end(), uint8_t{kGrey});
+  }
+
+  void put(size_t cell, const dataset::CaptureImage& image, uint32_t image_width) {
+    const uint32_t cut = (image_width - width_) / 2;
+    for (uint32_t y = 0; y < height_; ++y) {
+      for (uint32_t x = 0; x < width_; ++x) {
+        const size_t from = size_t{y} * image_width + x + cut;
+        uint8_t* to = image_.at(static_cast<uint32_t>(cell % columns_) * width_ + x, static_cast<uint32_t>(cell / columns_) * height_ + y);
         for (int c = 0; c < 3; ++c) {
           const uint32_t over = image.rgb[from * 3 + c] + (255u - image.alpha[from]) * kGrey / 255;
           to[c] = static_cast<uint8_t>(std::min(255u, over));
@@ -201,7 +206,51 @@ ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t col
       }
     }
   }
-  return sheet;
+
+  ports::ImageU8 take() { return std::move(image_); }
+
+ private:
+  static constexpr uint8_t kGrey = 118;
+  uint32_t columns_, width_, height_;
+  ports::ImageU8 image_;
+};
+
+// The camera that the figure's chest looks at most nearly.
+size_t front_camera(const dataset::Dataset& data, size_t frame) {
+  const std::array<float, 9> turn = rotation_from_quaternion(data.frames()[frame].pose().rotations.data());
+  const Vec3 front{turn[2], turn[5], turn[8]};
+  size_t best = 0;
+  float most = -2;
+  for (size_t c = 0; c < data.cameras().size(); ++c) {
+    const auto& m = data.cameras()[c].camera.view_from_world;
+    const float facing = -dot(front, Vec3{m[8], m[9], m[10]});  // the third row is the camera's own direction
+    if (facing > most) best = c, most = facing;
+  }
+  return best;
+}
+
+}  // namespace
+
+ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns, uint32_t rows) {
+  const dataset::Dataset data = dataset::Dataset::open(identity_directory);
+  const size_t frames = data.frames().size(), cameras = data.cameras().size(), cells = size_t{columns} * rows;
+  Sheet sheet(columns, rows, data.cameras()[0].camera);
+  for (size_t i = 0; i < cells; ++i) {
+    sheet.put(i, data.load_image(i * frames / cells, (i * 7 + i / columns) % cameras), data.cameras()[0].camera.width_px);
+  }
+  return sheet.take();
+}
+
+ports::ImageU8 people_sheet(const std::vector<std::string>& identity_directories, uint32_t columns) {
+  std::optional<Sheet> sheet;
+  for (size_t i = 0; i < identity_directories.size(); ++i) {
+    const dataset::Dataset data = dataset::Dataset::open(identity_directories[i]);
+    const Camera& size = data.cameras()[0].camera;
+    if (!sheet) sheet.emplace(columns, static_cast<uint32_t>((identity_directories.size() + columns - 1) / columns), size);
+    const size_t frame = i % data.frames().size();
+    sheet->put(i, data.load_image(frame, front_camera(data, frame)), size.width_px);
+  }
+  return sheet->take();
 }
 
 }  // namespace figurine::capture

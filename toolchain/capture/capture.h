@@ -13,7 +13,9 @@
 #include "figurine/package.h"
 #include "ports/linux/image.h"
 #include "toolchain/body/motion_clip.h"
+#include "toolchain/capture/folds.h"
 #include "toolchain/capture/rig.h"
+#include "toolchain/capture/wardrobe.h"
 
 namespace figurine::capture {
 
@@ -27,7 +29,8 @@ struct CaptureRequest {
   RigOptions rig;
   bool resume = false;  // go on where an interrupted run of the same request stopped
   uint32_t threads = 1;
-  std::string garment, hair;         // forced; empty: by seed
+  FoldMode folds = FoldMode::kPose;
+  WardrobeLimits limits;
   std::string tool;                  // "figurine-train 0.1.0"
   std::vector<std::string> sources;  // provenance lines of the motions
 };
@@ -53,5 +56,8 @@ std::string identity_name(uint32_t identity);
 // A contact sheet of one finished capture: `columns` x `rows` images of different frames and cameras over mid-grey, each cropped to its
 // middle.
 ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns, uint32_t rows);
+
+// One picture of each of several finished captures of the same image size (at least one), from the camera that the person looks at.
+ports::ImageU8 people_sheet(const std::vector<std::string>& identity_directories, uint32_t columns);
 
 }  // namespace figurine::capture

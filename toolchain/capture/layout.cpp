@@ -157,6 +157,12 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
   ordered_json description = ordered_json::object();
   for (const auto& [key, value] : person.description) description[key] = value;
   about_["person"] = description;
+  about_["folds"] = record.folds;
+  about_["limits"] = {{"outfits", record.limits.outfits},
+                      {"skins", record.limits.skins},
+                      {"excluded_outfits", record.limits.excluded_outfits},
+                      {"excluded_skins", record.limits.excluded_skins},
+                      {"hair", record.limits.hair}};
   about_["sources"] = record.sources;
   const dataset::Split split = dataset::default_split(static_cast<uint32_t>(sequence.size()), static_cast<uint32_t>(rig.size()));
   about_["held_out_cameras"] = ordered_json::array();

@@ -12,6 +12,7 @@
 #include "toolchain/capture/renderer.h"
 #include "toolchain/capture/rig.h"
 #include "toolchain/capture/sequence.h"
+#include "toolchain/capture/wardrobe.h"
 
 namespace figurine::capture {
 
@@ -22,6 +23,8 @@ struct IdentityRecord {
   std::string tool;
   std::string body_name, body_hash;
   std::vector<std::string> sources;
+  std::string folds;  // to_string(FoldMode)
+  WardrobeLimits limits;
   std::array<float, 3> root_rest_m{0, 0, 0};  // of the person's own shape
 };
 

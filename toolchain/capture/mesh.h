@@ -21,6 +21,15 @@ struct Material {
   bool casts_shadow = true;  // lashes and brows lie on the skin and would only darken it
 };
 
+// How a cloth folds.
+struct FoldStyle {
+  float wavelength_m = 0.03f;  // from fold to fold, mean
+  float slack = 0.015f;        // share by which the cloth is cut longer than what it covers: it gathers where it hangs
+  float strength = 1;          // 0: does not fold
+};
+
+class FoldPattern;
+
 // Rest pose; letters as in body/surface.h. Vertices are shared across texture seams, so that normals are smooth there.
 struct Mesh {
   std::string name;
@@ -31,6 +40,8 @@ struct Mesh {
   std::vector<uint8_t> skin_joints;    // [V,K]
   std::vector<float> skin_weights;     // [V,K]
   Material material;
+  std::vector<float> fold_strength;          // [V] 0 .. 1; empty: no folds
+  std::shared_ptr<const FoldPattern> folds;  // of this very mesh, or none
 
   uint32_t vertex_count() const { return static_cast<uint32_t>(position_m.size() / 3); }
   uint32_t triangle_count() const { return static_cast<uint32_t>(triangles.size() / 3); }

@@ -8,7 +8,9 @@
 #include "toolchain/body/makehuman_model.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/texel_body.h"
+#include "toolchain/capture/cloth_strength.h"
 #include "toolchain/capture/cover.h"
+#include "toolchain/capture/folds.h"
 #include "toolchain/capture/proxy.h"
 #include "toolchain/capture/wardrobe.h"
 #include "toolchain/error.h"
@@ -17,7 +19,7 @@ namespace figurine::capture {
 namespace {
 
 // Streams of a person's seed.
-constexpr uint64_t kShapeStream = 1, kWardrobeStream = 2;
+constexpr uint64_t kShapeStream = 1, kWardrobeStream = 2, kFoldStream = 5;
 
 constexpr uint32_t kMannequinTextureSize = 512;
 
@@ -57,6 +59,13 @@ class Dresser {
     ports::ImageU8 image = read_png(texture);
     for (const ClonedRegion& clone : garment.cover) clone_region(image, clone.region, clone.shift);
     for (const Region& region : garment.dyed) recolour_region(image, region, outfit.dye_turn_rad, outfit.dye_saturation, outfit.dye_value);
+    const ports::ImageU8 undyed = image;
+    for (const DyedCloth& cloth : garment.cloths) {
+      const auto fabric = static_cast<size_t>(cloth.fabric);
+      const DyeBath bath{
+          .fibre = cloth.fibre, .dye = outfit.dye[fabric], .reference = cloth.reference, .amount = outfit.dye_amount[fabric]};
+      dye_region(image, undyed, cloth.region, bath);
+    }
     mesh.material.colour = colour_texture(image);
     if (!proxy.normal_map.empty()) mesh.material.normal = std::make_shared<Texture>(read_png(proxy.normal_map), TextureEncoding::kVector);
     return mesh;
@@ -110,12 +119,6 @@ class Dresser {
   std::vector<Mesh> meshes_;
 };
 
-template <class T>
-const T* find_named(const std::vector<T>& list, const std::string& name) {
-  const auto found = std::find_if(list.begin(), list.end(), [&](const T& item) { return name == item.name; });
-  return found == list.end() ? nullptr : &*found;
-}
-
 }  // namespace
 
 ShapeFit fit_shape(const Body& body, const body::Surface& surface, const body::JointPositions& joints) {
@@ -147,21 +150,13 @@ ShapeFit fit_shape(const Body& body, const body::Surface& surface, const body::J
 Person make_makehuman_person(const PersonRequest& request, const body::MakeHuman& makehuman, const std::string& directory,
                              const Body& body) {
   const body::MacroShape shape = body::sample_macro_shape(Random(request.seed, kShapeStream).bits(0) >> 32);
-  const bool male = shape.gender >= 0.5f;
-  Outfit outfit = choose_outfit(Random(request.seed, kWardrobeStream), shape);
-  if (!request.garment.empty()) {
-    outfit.garment = find_named(garments_for(male), request.garment);
-    if (outfit.garment == nullptr) throw InputError("--outfit: '" + request.garment + "' is not in the wardrobe of this person");
-  }
-  if (!request.hair.empty()) {
-    outfit.hair = find_named(hair_for(male), request.hair);
-    if (outfit.hair == nullptr) throw InputError("--hair: '" + request.hair + "' is not in the wardrobe of this person");
-    outfit.hair_tint = outfit.hair->tints[0];
-  }
+  const Outfit outfit = choose_outfit(request.seed, shape, request.limits);
 
   const std::vector<float> vertices_m = makehuman.vertices(shape);
   Dresser dresser(makehuman, directory, vertices_m);
-  dresser.add_garment(*outfit.garment, outfit, Surfacing::kCloth);
+  Mesh& garment = dresser.add_garment(*outfit.garment, outfit, Surfacing::kCloth);
+  garment.fold_strength = cloth_strength(garment);
+  garment.folds = std::make_shared<FoldPattern>(garment, outfit.garment->folds, Random(request.seed, kFoldStream).bits(0));
   const bool barefoot = !dresser.feet_covered();
   if (barefoot) {
     Mesh& shoes = dresser.add_garment(*outfit.shoes, outfit, Surfacing::kLeather);
@@ -172,12 +167,14 @@ Person make_makehuman_person(const PersonRequest& request, const body::MakeHuman
   brows.material.casts_shadow = false;
   Mesh& lashes = dresser.add("eyelashes", outfit.eyelashes, outfit.eyelashes + ".png", Surfacing::kHair);
   lashes.material.casts_shadow = false;
-  dresser.add("eyes", "HighPolyEyes", outfit.eyes, Surfacing::kEye);
+  dresser.add("eyes", "HighPolyEyes", outfit.eyes, Surfacing::kEye).material.tint = outfit.eye_tint;
   dresser.add("teeth", "Teeth_Base", "teeth.png", Surfacing::kSkin);
 
   Mesh skin = dresser.skin();
   remove_triangles(skin, covered_vertices(skin, dresser.garment(), {.outward_m = 0.03f, .inward_m = 0.006f}));
   skin.material.colour = colour_texture(read_png(directory + "/public/data/skins/" + outfit.skin + "/textures/" + outfit.skin_texture));
+
+  skin.material.tint = outfit.skin_tint;
 
   Person person;
   person.meshes = dresser.take();
@@ -243,6 +240,7 @@ Person make_mannequin_person(const PersonRequest& request, const Body& body) {
       throw InputError("--body: not this version's mannequin; make it again with figurine-train body --mannequin");
     }
   }
+  if (!request.limits.empty()) throw InputError("--outfit, --skin, --hair and their exclusions: the mannequin has no wardrobe");
   const Random shape(request.seed, kShapeStream), wardrobe(request.seed, kWardrobeStream);
   Person person;
   for (uint32_t s = 0; s < model.shape_count; ++s) person.shape.push_back(static_cast<float>(std::clamp(shape.normal(s), -1.5, 1.5)));
@@ -276,6 +274,8 @@ Person make_mannequin_person(const PersonRequest& request, const Body& body) {
   mesh.skin_weights = model.surface.skin_weights;
   mesh.material.colour = colour_texture(image);
   mesh.material.surfacing = Surfacing::kCloth;
+  mesh.fold_strength = cloth_strength(mesh);
+  mesh.folds = std::make_shared<FoldPattern>(mesh, FoldStyle{}, Random(request.seed, kFoldStream).bits(0));
   person.meshes.push_back(std::move(mesh));
   person.shape.resize(std::max<size_t>(person.shape.size(), body.shape_count()), 0.0f);
   person.description = {{"body", "mannequin"}};

@@ -9,13 +9,13 @@
 #include "toolchain/body/body_model.h"
 #include "toolchain/body/makehuman.h"
 #include "toolchain/capture/mesh.h"
+#include "toolchain/capture/wardrobe.h"
 
 namespace figurine::capture {
 
 struct PersonRequest {
   uint64_t seed = 1;
-  // For looking at the wardrobe: force a garment or hair style by name. Empty: by seed.
-  std::string garment, hair;
+  WardrobeLimits limits;  // the mannequin has no wardrobe: InputError if there are any
 };
 
 // A dressed MakeHuman person. body must be a package made from the same base mesh (any T). directory: the unpacked npm package.

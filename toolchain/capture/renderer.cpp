@@ -20,8 +20,9 @@ constexpr int kLanes = 8;            // samples of a pixel, traced as one packet
 constexpr int kMaxLayers = 24;       // of transparent hair behind one sample
 constexpr float kOpaque = 0.985f;    // alpha from which nothing behind is looked for
 constexpr float kInvisible = 0.02f;  // alpha below which a hit is passed over
-constexpr int kAmbientDirections = 96;
+constexpr int kAmbientDirections = 64;
 constexpr float kAmbientReach_m = 1.5f;
+constexpr float kFoldShade = 2.5f;        // share of the sky that a fold as high as its wavelength would win or lose
 constexpr float kSurfaceGap_m = 0.0008f;  // ray origins are lifted by this
 constexpr unsigned kAllMask = ~0u, kShadowMask = 2u, kVisibleMask = 1u;
 
@@ -35,6 +36,11 @@ constexpr std::array<std::array<float, 2>, kLanes> kPixelPattern = {{{9.f / 16, 
                                                                      {1.f / 16, 7.f / 16},
                                                                      {11.f / 16, 15.f / 16},
                                                                      {15.f / 16, 1.f / 16}}};
+
+// In the middle of an opaque surface, where all eight hits are neighbours, four of them are shaded and stand for two each: a rotated grid
+// of their own (the sample at the other end of the arrow is the nearest). Outlines, hair and steep surfaces keep all eight.
+constexpr std::array<int, kLanes> kStandsFor = {2, 6, 2, 3, 5, 5, 6, 3};
+constexpr float kNeighbours = 3;  // depths within a pixel, in pixel widths
 
 // Points of a disc, one a lane, by the golden angle.
 std::array<std::array<float, 2>, kLanes> light_pattern() {
@@ -82,6 +88,7 @@ struct PosedMesh {
   std::vector<float> position, normal, ambient;  // [V,3]
   std::vector<uint8_t> used;                     // [V] whether a triangle has it
   std::vector<float> texels_per_m;               // [F] of the colour texture
+  std::vector<FoldSample> folds;                 // of the mesh' fold pattern in this pose, world; empty: none
   std::array<float, 2> uv(uint32_t triangle, float b1, float b2) const {
     const uint32_t* t = &mesh->uv_triangles[size_t{triangle} * 3];
     const float b0 = 1 - b1 - b2;
@@ -140,6 +147,19 @@ std::vector<float> texel_density(const Mesh& mesh) {
   return out;
 }
 
+// [V,9] linear parts of the blended transforms, row-major.
+std::vector<float> linear_parts(const Mesh& mesh, std::span<const Affine> world_from_rest) {
+  std::vector<float> out(size_t{mesh.vertex_count()} * 9);
+  for (size_t v = 0; v < mesh.vertex_count(); ++v) {
+    const Affine transform = blend(world_from_rest, &mesh.skin_joints[v * kSkinInfluences], &mesh.skin_weights[v * kSkinInfluences]);
+    for (size_t row = 0; row < 3; ++row) std::copy_n(&transform.m[row * 4], 3, &out[v * 9 + row * 3]);
+  }
+  return out;
+}
+
+// Light gathered at the coarse vertices knows nothing of folds: hollows see less of the sky than ridges do.
+float fold_openness(float height_m, float wavelength_m) { return std::clamp(1 + kFoldShade * height_m / wavelength_m, 0.6f, 1.1f); }
+
 }  // namespace
 
 struct Renderer::Scene {
@@ -147,6 +167,7 @@ struct Renderer::Scene {
   RTCScene scene = nullptr;
   std::vector<PosedMesh> meshes;
   Lighting lighting;
+  FoldMode fold_mode = FoldMode::kPose;
   Encoder encode;
   std::array<std::array<float, 2>, kLanes> light_points = light_pattern();
   std::array<Vec3, kAmbientDirections> directions = sphere_directions();
@@ -160,10 +181,12 @@ struct Renderer::Scene {
     float alpha = 0;
   };
   Surface surface(const RTCRayHit8& hits, int lane, float pixel_angle) const;
+  bool is_interior(const RTCRayHit8& hits, float pixel_angle) const;
   void trace_pixel(const Camera& camera, uint32_t px, uint32_t py, Vec3 eye, const float* rotation, float pixel_angle, float* out) const;
 };
 
-Renderer::Renderer(const Person& person) : scene_(std::make_unique<Scene>()) {
+Renderer::Renderer(const Person& person, FoldMode folds) : scene_(std::make_unique<Scene>()) {
+  scene_->fold_mode = folds;
   // One thread: several renderers run side by side. One instruction set, so that the same bytes come from CPUs with and without AVX-512.
   scene_->device = rtcNewDevice("threads=1,isa=avx2");
   FIG_CHECK(scene_->device != nullptr, "Embree gives a device");
@@ -190,6 +213,11 @@ void Renderer::set_pose(std::span<const Affine> world_from_rest) {
   for (PosedMesh& posed : scene_->meshes) {
     posed.position = body::skin_positions(posed.mesh->position_m, posed.mesh->skin_joints, posed.mesh->skin_weights, world_from_rest);
     posed.normal = body::vertex_normals(posed.position, posed.mesh->triangles);
+    if (posed.mesh->folds != nullptr && scene_->fold_mode != FoldMode::kOff) {
+      const bool rest = scene_->fold_mode == FoldMode::kRest;
+      posed.folds = posed.mesh->folds->evaluate(rest ? posed.mesh->position_m : posed.position);
+      posed.mesh->folds->turn(posed.folds, linear_parts(*posed.mesh, world_from_rest));
+    }
   }
   scene_->build();
   scene_->gather_ambient();
@@ -301,7 +329,7 @@ Renderer::Scene::Surface Renderer::Scene::surface(const RTCRayHit8& hits, int la
 
   const std::array<float, 2> uv = posed.uv(triangle, b1, b2);
   const float footprint_m = hits.ray.tfar[lane] * pixel_angle;
-  const float level = std::log2(std::max(posed.texels_per_m[triangle] * footprint_m, 1e-6f)) - 1;  // eight samples share the pixel
+  const float level = std::log2(std::max(posed.texels_per_m[triangle] * footprint_m, 1e-6f)) - 1;  // at least four samples share the pixel
   const Rgba texel = mesh.material.colour->sample(uv[0], uv[1], level);
 
   Surface out;
@@ -313,6 +341,11 @@ Renderer::Scene::Surface Renderer::Scene::surface(const RTCRayHit8& hits, int la
 
   Vec3 geometric = normalized(cross(p[1] - p[0], p[2] - p[0]));
   Vec3 normal = normalized(n[0] * b0 + n[1] * b1 + n[2] * b2);
+  if (!posed.folds.empty()) {
+    const FoldSample fold = mesh.folds->at(posed.folds, triangle, b1, b2);
+    out.point.ambient = out.point.ambient * fold_openness(fold.height_m, mesh.folds->wavelength_m());
+    normal = normalized(normal - (fold.gradient - normal * dot(fold.gradient, normal)));
+  }
   if (mesh.material.normal) {
     // Tangents from the texture coordinates; v is down, normal maps have green up.
     const uint32_t* s = &mesh.uv_triangles[size_t{triangle} * 3];
@@ -350,6 +383,18 @@ Renderer::Scene::Surface Renderer::Scene::surface(const RTCRayHit8& hits, int la
   return out;
 }
 
+bool Renderer::Scene::is_interior(const RTCRayHit8& hits, float pixel_angle) const {
+  const unsigned mesh = hits.hit.geomID[0];
+  if (mesh == RTC_INVALID_GEOMETRY_ID || meshes[mesh].mesh->material.surfacing == Surfacing::kHair) return false;
+  float near = hits.ray.tfar[0], far = near;
+  for (int i = 1; i < kLanes; ++i) {
+    if (hits.hit.geomID[i] != mesh) return false;
+    near = std::min(near, hits.ray.tfar[i]);
+    far = std::max(far, hits.ray.tfar[i]);
+  }
+  return far - near < kNeighbours * near * pixel_angle;
+}
+
 void Renderer::Scene::trace_pixel(const Camera& camera, uint32_t px, uint32_t py, Vec3 eye, const float* rotation, float pixel_angle,
                                   float* out) const {
   alignas(32) RTCRayHit8 hits;
@@ -377,8 +422,13 @@ void Renderer::Scene::trace_pixel(const Camera& camera, uint32_t px, uint32_t py
   RTCIntersectArguments arguments;
   rtcInitIntersectArguments(&arguments);
   arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  bool interior = false;
   for (int layer = 0; layer < kMaxLayers; ++layer) {
     rtcIntersect8(active, scene, &hits, &arguments);
+    if (layer == 0 && is_interior(hits, pixel_angle)) {
+      interior = true;
+      for (int i = 0; i < kLanes; ++i) active[i] = kStandsFor[i] == i ? -1 : 0;
+    }
     Surface surfaces[kLanes];
     Vec3 origin[kLanes], direction[kLanes];
     int wants_light[kLanes];
@@ -420,6 +470,9 @@ void Renderer::Scene::trace_pixel(const Camera& camera, uint32_t px, uint32_t py
       hits.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     }
     if (!any_left) break;
+  }
+  if (interior) {
+    for (int i = 0; i < kLanes; ++i) colour[i] = colour[kStandsFor[i]], through[i] = through[kStandsFor[i]];
   }
   // Encoded first, averaged after: images are blended as stored (docs/numerics.md).
   Vec3 sum;

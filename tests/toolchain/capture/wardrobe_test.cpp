@@ -84,11 +84,76 @@ TEST(Wardrobe, EmblemsAreCovered) {
 
 TEST(Wardrobe, SameSeedSameOutfit) {
   const body::MacroShape shape = body::sample_macro_shape(7);
-  const Outfit a = choose_outfit(Random(3, 2), shape), b = choose_outfit(Random(3, 2), shape);
+  const Outfit a = choose_outfit(3, shape), b = choose_outfit(3, shape);
   EXPECT_EQ(a.garment, b.garment);
   EXPECT_EQ(a.hair, b.hair);
   EXPECT_EQ(a.skin_texture, b.skin_texture);
   EXPECT_EQ(a.dye_turn_rad, b.dye_turn_rad);
+  EXPECT_EQ(a.dye[0].x, b.dye[0].x);
+}
+
+std::string refusal(const WardrobeLimits& limits, const body::MacroShape& shape) {
+  try {
+    choose_outfit(3, shape, limits);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no error";
+  return "";
+}
+
+TEST(Wardrobe, ExcludedOutfitsAndSkinsAreNeverWorn) {
+  const WardrobeLimits limits{.excluded_outfits = {"male_worksuit01", "female_sportsuit01"},
+                              .excluded_skins = {"young_darkskinned_male_diffuse", "old_lightskinned_female_diffuse2"}};
+  int redressed = 0;
+  for (uint64_t seed = 0; seed < 300; ++seed) {
+    const body::MacroShape shape = body::sample_macro_shape(seed);
+    const Outfit free = choose_outfit(seed, shape), limited = choose_outfit(seed, shape, limits);
+    for (const std::string& name : limits.excluded_outfits) EXPECT_NE(limited.garment->name, name);
+    for (const std::string& name : limits.excluded_skins) EXPECT_NE(limited.skin_texture, name + ".png");
+    const bool concerned = std::string(free.garment->name).find("worksuit") != std::string::npos ||
+                           std::string(free.garment->name).find("sportsuit") != std::string::npos;
+    redressed += concerned;
+    EXPECT_TRUE(concerned || free.garment == limited.garment) << "who is not concerned keeps their clothes";
+    EXPECT_EQ(free.hair, limited.hair);
+    EXPECT_EQ(free.dye[1].x, limited.dye[1].x);
+  }
+  EXPECT_GT(redressed, 20);
+}
+
+TEST(Wardrobe, OnlyListedOutfitsAndSkinsAreWorn) {
+  const WardrobeLimits limits{.outfits = {"male_worksuit01", "female_sportsuit01"},
+                              .skins = {"young_darkskinned_male_diffuse", "old_lightskinned_female_diffuse2"}};
+  for (uint64_t seed = 0; seed < 50; ++seed) {
+    const body::MacroShape shape = body::sample_macro_shape(seed);
+    const Outfit outfit = choose_outfit(seed, shape, limits);
+    const bool male = shape.gender >= 0.5f;
+    EXPECT_STREQ(outfit.garment->name, male ? "male_worksuit01" : "female_sportsuit01");
+    EXPECT_EQ(outfit.skin_texture, male ? "young_darkskinned_male_diffuse.png" : "old_lightskinned_female_diffuse2.png");
+    EXPECT_EQ(outfit.skin, male ? "young_african_male" : "old_asian_female");
+  }
+}
+
+TEST(Wardrobe, LimitsThatLeaveNothingAreNamed) {
+  body::MacroShape man = body::sample_macro_shape(7);
+  man.gender = 0.9f;
+  EXPECT_NE(refusal({.outfits = {"male_suit99"}}, man).find("--outfit: 'male_suit99'"), std::string::npos);
+  EXPECT_NE(refusal({.skins = {"green"}}, man).find("--skin: 'green'"), std::string::npos);
+  EXPECT_NE(refusal({.excluded_outfits = {"green"}}, man).find("--exclude-outfits: 'green'"), std::string::npos);
+  EXPECT_NE(refusal({.excluded_skins = {"green"}}, man).find("--exclude-skins: 'green'"), std::string::npos);
+  EXPECT_NE(refusal({.hair = "bald"}, man).find("--hair: 'bald'"), std::string::npos);
+  EXPECT_NE(refusal({.hair = "bob01"}, man).find("--hair: 'bob01'"), std::string::npos);
+  EXPECT_NE(refusal({.outfits = {"female_sportsuit01"}}, man).find("--outfit"), std::string::npos);
+  WardrobeLimits nothing;
+  for (const Garment& garment : garments_for(true)) nothing.excluded_outfits.push_back(garment.name);
+  EXPECT_NE(refusal(nothing, man).find("--exclude-outfits: leaves nothing"), std::string::npos);
+}
+
+TEST(Wardrobe, EverySkinIsThere) {
+  EXPECT_EQ(skins().size(), 20u);
+  for (const Skin& skin : skins()) {
+    EXPECT_EQ(read_png(directory() + "/public/data/skins/" + skin.folder + "/textures/" + skin.texture).width_px % 256, 0u) << skin.texture;
+  }
 }
 
 TEST(Proxy, EveryGarmentFitsAnyPerson) {
