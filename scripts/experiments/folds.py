@@ -3,7 +3,8 @@
     scripts/run python3 scripts/experiments/folds.py [FOLDER]        FOLDER (default out/folds) keeps the captures; from preset dev
 
 Folds: the same people, poses and cameras with the folds of every pose (the truth), with those of the rest pose and without any; PSNR over the pixels whose
-true alpha exceeds 0.5, on stored values, pooled (docs/numerics.md, "Picture quality"). The outline is the same in all three, so the background cancels. JPEG's own error (quality 97) is in all of them.
+true alpha exceeds 0.5, on stored values, pooled (docs/numerics.md, "Picture quality"). The outline is the same in all three, so the background cancels. JPEG's own
+error (quality 97) is in all of them.
 Cost: CPU seconds of one identity of 300 images, start-up included.
 """
 
