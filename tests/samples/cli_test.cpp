@@ -34,7 +34,13 @@ class Cli : public testing::Test {
 
   // Runs in an empty folder; P/ in the arguments is the folder of the packages.
   ProgramRun run(std::string arguments, RunOptions options = {}) {
-    for (size_t at = 0; (at = arguments.find("P/", at)) != std::string::npos;) arguments.replace(at, 2, packages_->path() + "/");
+    // At the beginning of a word only, and on behind what was put in: a folder's random name may end in P itself.
+    const std::string packages = packages_->path() + "/";
+    for (size_t at = 0; (at = arguments.find("P/", at)) != std::string::npos;) {
+      const bool word = at == 0 || arguments[at - 1] == ' ';
+      if (word) arguments.replace(at, 2, packages);
+      at += word ? packages.size() : 2;
+    }
     options.folder = folder_.path();
     return run_figurine(arguments, options);
   }
