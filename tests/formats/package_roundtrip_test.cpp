@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "formats/opened.h"
 #include "formats/package_samples.h"
 
 namespace figurine {
@@ -12,24 +13,9 @@ namespace {
 using samples::AvatarSample;
 using samples::BodySample;
 using samples::MotionSample;
-
-struct Opened {
-  AlignedBytes bytes;
-  Package package;
-};
-
-Opened open_or_die(const Result<std::vector<std::byte>>& written) {
-  FIG_CHECK(written.ok(), written.status().message().c_str());
-  AlignedBytes bytes(*written);
-  Result<Package> package = Package::open(bytes.bytes(), "sample");
-  FIG_CHECK(package.ok(), package.status().message().c_str());
-  return {std::move(bytes), std::move(package).value()};
-}
-
-template <class T>
-bool same(std::span<const T> a, std::span<const T> b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
-}
+using samples::open_or_die;
+using samples::Opened;
+using samples::same;
 
 template <class T>
 void expect_view(const Opened& opened, std::span<const T> array) {

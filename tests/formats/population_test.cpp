@@ -11,6 +11,7 @@
 
 #include "figurine/half.h"
 #include "figurine/rans.h"
+#include "formats/opened.h"
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
 #include "formats/writer/package_parts.h"
@@ -21,7 +22,10 @@ namespace {
 
 using samples::AvatarSample;
 using samples::ExactBytes;
+using samples::open_or_die;
+using samples::Opened;
 using samples::PopulationSample;
+using samples::same;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -153,24 +157,6 @@ TEST(Rans, FrequenciesKeepEveryValueAndTheirSum) {
 }
 
 // ---- Round trips -----------------------------------------------------------------------------------------------------------------------
-
-struct Opened {
-  AlignedBytes bytes;
-  Package package;
-};
-
-Opened open_or_die(const Result<std::vector<std::byte>>& written) {
-  FIG_CHECK(written.ok(), written.status().message().c_str());
-  AlignedBytes bytes(*written);
-  Result<Package> package = Package::open(bytes.bytes(), "sample");
-  FIG_CHECK(package.ok(), package.status().message().c_str());
-  return {std::move(bytes), std::move(package).value()};
-}
-
-template <class T>
-bool same(std::span<const T> a, std::span<const T> b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
-}
 
 TEST(PopulationRoundTrip, MembersKeepWhatIsNotRounded) {
   for (const DifferenceCoding coding : {DifferenceCoding::kInt8, DifferenceCoding::kHalf}) {

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -150,7 +151,9 @@ void run_capture(CaptureOptions options) {
   for (const std::string& path : options.motions) {
     std::string source;
     motions.push_back(read_motion(path, package.body(), &source));
-    if (!source.empty()) request.sources.push_back(source);
+    // Once, however many motions come from the same clip.
+    const bool known = std::find(request.sources.begin(), request.sources.end(), source) != request.sources.end();
+    if (!source.empty() && !known) request.sources.push_back(source);
   }
   if (options.identity >= 0) {
     request.first_identity = static_cast<uint32_t>(options.identity);
