@@ -1,9 +1,10 @@
-"""Writes docs/results/gradients.json, splat_oracle.json, stability.json and bench.json from programs of preset dev.
+"""Writes docs/results/gradients.json, splat_oracle.json, stability.json, bench.json and network_bench.json from programs of preset dev.
 
     scripts/run python3 scripts/experiments/checks.py
 
 gradients: finite differences of every gradient in float64; splat_oracle: `figurine splat` against the float64 oracle through files; stability: the table of
-extreme cases; bench: the shipped avatar per stage, in the release build. The first three do not depend on the machine's mood; keep it quiet for the last.
+extreme cases; bench: the shipped avatar per stage, in the release build; network_bench: the networks
+of edge and paper alone, in float, in fixed point and with ranges found at run time. The first three do not depend on the machine's mood; keep it quiet for the others.
 """
 
 import datetime
@@ -53,6 +54,16 @@ def main():
 
     bench = ["build/release/samples/figurine/figurine", "bench", "samples/packages/person.fgn", "--motion", "samples/packages/walk.fgn", "--size", "512x512", "--json", "-"]
     write("bench", json.loads(text_of(*bench)), " ".join(bench))
+    network_bench()
+
+
+# Rows ARITHMETIC/T/C/THREADS: f32; qs8, every texel; qs8 drawn, only the texels that an avatar draws; qd8, dynamic ranges.
+def network_bench():
+    command = ["build/dev/tests/bench/network_bench", "--benchmark_enable_random_interleaving=true", "--benchmark_repetitions=9", "--benchmark_min_time=0.1s",
+               "--benchmark_report_aggregates_only=true", "--benchmark_format=json"]
+    rows = json.loads(text_of(*command))["benchmarks"]
+    medians = {row["run_name"].removesuffix("/real_time"): round(row["real_time"], 3) for row in rows if row["aggregate_name"] == "median"}
+    write("network_bench", {"median_ms": medians}, " ".join(command))
 
 
 if __name__ == "__main__":
