@@ -227,7 +227,12 @@ const std::vector<Garment>& garments_for(bool male) {
        {{box(0, 0, 160, 512), Fibre::kDark, Fabric::kSuit, kBlackSuit},
         {box(160, 240, 384, 512), Fibre::kDark, Fabric::kSuit, kBlackSuit},
         {box(262, 0, 512, 238), Fibre::kDark, Fabric::kSuit, kBlackSuit},
-        {box(384, 368, 512, 512), Fibre::kDark, Fabric::kSuit, kBlackSuit}}},
+        // The front's other half, around the collar and the tie.
+        {box(244, 44, 262, 64), Fibre::kDark, Fabric::kSuit, kBlackSuit},
+        {box(220, 54, 244, 64), Fibre::kDark, Fabric::kSuit, kBlackSuit},
+        {box(212, 64, 262, 240), Fibre::kDark, Fabric::kSuit, kBlackSuit},
+        {box(192, 100, 212, 240), Fibre::kDark, Fabric::kSuit, kBlackSuit},
+        {box(384, 364, 512, 512), Fibre::kDark, Fabric::kSuit, kBlackSuit}}},
       {"male_worksuit01", {}, {}, kOveralls, {{box(0, 0, 512, 512), Fibre::kBlue, Fabric::kTrousers, 0.60f}}},
   };
   static const std::vector<Garment> kFemale = {
