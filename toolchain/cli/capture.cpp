@@ -13,10 +13,9 @@
 #include "figurine/package.h"
 #include "ports/linux/files.h"
 #include "ports/linux/png.h"
-#include "toolchain/body/retarget.h"
+#include "toolchain/body/clip.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/cli/commands.h"
-#include "toolchain/cli/glb_source.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
@@ -26,9 +25,6 @@ namespace {
 
 // Debian's assimp-testmodels: a CMU clip.
 constexpr const char* kDefaultMotion = "/usr/share/assimp/models/BVH/01_01.bvh";
-constexpr const char* kCmuSource =
-    "CMU Graphics Lab Motion Capture Database, BVH conversion by B. Hahne: free for research and commercial use; created with funding from "
-    "NSF EIA-0196217";
 constexpr int kSheetQuality = 88;
 
 struct CaptureOptions {
@@ -71,25 +67,6 @@ class ImageBar {
   double last_s_ = -1;
   std::chrono::steady_clock::time_point start_;
 };
-
-body::MotionClip read_motion(const std::string& path, const Body& body, std::string* source) {
-  const std::string extension = std::filesystem::path(path).extension().string(), name = std::filesystem::path(path).stem().string();
-  if (extension == ".bvh") {
-    *source = std::filesystem::path(path).filename().string() + ": " + kCmuSource;
-    return body::retarget_bvh(body::read_bvh(path), body, {.name = name});
-  }
-  if (extension == ".glb") {
-    *source = glb_source(path);
-    return body::retarget_glb(path, body, {.name = name});
-  }
-  if (extension == ".fgn") {
-    const ports::MappedFile file = value_or_throw(ports::MappedFile::open(path), path);
-    const Package package = value_or_throw(Package::open(file.bytes(), path), path);
-    for (const std::string& line : package.provenance().sources) *source += (source->empty() ? "" : "; ") + line;
-    return body::read_motion_clip(path);
-  }
-  throw InputError(path + ": unsupported: a motion is a .bvh, a .glb or a motion package .fgn");
-}
 
 void parse_size(const std::string& text, capture::RigOptions& rig) {
   unsigned width = 0, height = 0;
@@ -149,8 +126,8 @@ void run_capture(CaptureOptions options) {
   }
   std::vector<body::MotionClip> motions;
   for (const std::string& path : options.motions) {
-    std::string source;
-    motions.push_back(read_motion(path, package.body(), &source));
+    motions.push_back(body::read_clip(path, package.body(), {.name = std::filesystem::path(path).stem().string()}));
+    const std::string source = body::clip_source(path);
     // Once, however many motions come from the same clip.
     const bool known = std::find(request.sources.begin(), request.sources.end(), source) != request.sources.end();
     if (!source.empty() && !known) request.sources.push_back(source);

@@ -13,6 +13,7 @@ void add_motion_command(CLI::App& app);
 void add_capture_command(CLI::App& app);
 void add_avatar_command(CLI::App& app);
 void add_pack_command(CLI::App& app);
+void add_population_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 
 }  // namespace figurine::cli

@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
   figurine::cli::add_capture_command(app);
   figurine::cli::add_avatar_command(app);
   figurine::cli::add_pack_command(app);
+  figurine::cli::add_population_command(app);
   figurine::cli::add_evaluate_command(app);
   try {
     app.parse(argc, argv);

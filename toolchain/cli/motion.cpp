@@ -6,10 +6,10 @@
 
 #include "formats/writer/package_writer.h"
 #include "ports/linux/files.h"
+#include "toolchain/body/clip.h"
 #include "toolchain/body/motion_loop.h"
 #include "toolchain/body/retarget.h"
 #include "toolchain/cli/commands.h"
-#include "toolchain/cli/glb_source.h"
 #include "toolchain/error.h"
 
 namespace figurine::cli {
@@ -29,11 +29,6 @@ struct MotionOptions {
   bool in_place = false;
 };
 
-// The sentence that the database's authors ask for.
-constexpr const char* kCmuSource =
-    "BVH conversion by B. Hahne, free for research and commercial use. The data used in this project was obtained from mocap.cs.cmu.edu. "
-    "The database was created with funding from NSF EIA-0196217.";
-
 void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), "--body");
   const Package package = value_or_throw(Package::open(file.bytes(), options.body), "--body");
@@ -51,16 +46,8 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   retarget.z_up = options.up == "z";
 
   body::RetargetReport report;
-  body::MotionClip clip;
-  if (extension == ".bvh") {
-    clip = body::retarget_bvh(body::read_bvh(options.clip), package.body(), retarget, &report);
-  } else if (extension == ".npz") {
-    clip = body::retarget_npz(options.clip, package.body(), retarget, &report);
-  } else if (extension == ".glb") {
-    clip = body::retarget_glb(options.clip, package.body(), retarget, &report);
-  } else {
-    throw InputError(options.clip + ": unsupported: the name must end in .bvh, .npz or .glb");
-  }
+  if (extension == ".fgn") throw InputError(options.clip + ": is a motion package already");
+  body::MotionClip clip = body::read_clip(options.clip, package.body(), retarget, &report);
 
   if (options.loop_cycles > 0) {
     body::LoopReport loop;
@@ -78,15 +65,7 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
                          {"loop_cycles", std::to_string(options.loop_cycles)},
                          {"smooth_s", std::to_string(retarget.smooth_s.value_or(extension == ".glb" ? 0 : body::kCaptureSmoothS))}};
   if (extension == ".glb") provenance.settings.push_back({"animation", std::to_string(retarget.animation)});
-  if (!options.source.empty()) {
-    provenance.sources = {options.source};
-  } else if (extension == ".bvh") {
-    provenance.sources = {path.filename().string() + ": " + kCmuSource};
-  } else if (extension == ".glb") {
-    provenance.sources = {glb_source(options.clip)};
-  } else {
-    provenance.sources = {path.filename().string() + ": supplied by the user"};
-  }
+  provenance.sources = {options.source.empty() ? body::clip_source(options.clip) : options.source};
   const auto bytes = value_or_throw(write_package(clip.view(), provenance), options.output);
   throw_if_error(ports::write_file_atomically(options.output, bytes), "-o");
   std::printf(

@@ -83,7 +83,9 @@ Provenance make_provenance(const TrainedAvatar& avatar, const RunDirectory& run,
   provenance.commercial_usage = or_default(options.commercial_usage, synthetic ? "corporation" : "personalNonProfit");
   provenance.depicted_person = or_default(options.depicted_person, "synthetic");
   for (const char* key : {"command", "commit"}) provenance.settings.push_back({key, text_of(json, key)});
-  flatten(to_json(avatar.description().settings), "", provenance.settings);
+  nlohmann::json said = to_json(avatar.description().settings);
+  said["init"] = std::filesystem::path(avatar.description().settings.init).filename().string();  // folders mean nothing elsewhere
+  flatten(said, "", provenance.settings);
   for (const char* key : {"iterations", "train_seconds"}) {
     if (json.contains(key)) provenance.settings.push_back({key, json.at(key).dump()});
   }

@@ -73,7 +73,7 @@ TEST(MotionCommand, BadFilesGiveOneLineAndNothingElse) {
                                           {"text.glb", "text.glb: header: magic: not a binary glTF file"},
                                           {"still.glb", "still.glb: animations: there are none"},
                                           {"strange.glb", "strange.glb: nodes: no joint has a known name"},
-                                          {"walk.gltf", "walk.gltf: unsupported: the name must end in .bvh, .npz or .glb"},
+                                          {"walk.gltf", "walk.gltf: unsupported: a motion is a .bvh, .npz or .glb clip"},
                                           {"walk.glb --animation 1", "walk.glb: animations: no number 1: there are 1"},
                                           {"walk.glb --start 500", "walk.glb: start 500: the clip has 32 frames"}}) {
     const ProgramRun run = motion(folder, arguments);

@@ -1,0 +1,176 @@
+// A whole small population, from the recipe to the package: what is left behind, that a build killed anywhere goes on to the same bits, and
+// that a member that fails takes no other with it. Builds fork, so nothing here starts a thread.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/toolchain/population/small_recipe.h"
+#include "tests/toolchain/train/small_capture.h"
+#include "toolchain/body/motion_clip.h"
+#include "toolchain/error.h"
+#include "toolchain/population/build.h"
+#include "toolchain/population/state.h"
+#include "toolchain/train/package_file.h"
+#include "toolchain/train/run_directory.h"
+
+namespace figurine::population {
+namespace {
+
+namespace fs = std::filesystem;
+using testing_tools::TemporaryFolder;
+
+constexpr const char* kPeople[] = {"000000", "000001", "000002", "000010"};
+
+void write_motion(const std::string& path) {
+  body::MotionClip clip;
+  clip.name = "swinging";
+  clip.frame_count = 40;
+  for (uint32_t f = 0; f < clip.frame_count; ++f) {
+    clip.root_translation_m.insert(clip.root_translation_m.end(), {0, 0, 0});
+    for (uint32_t j = 0; j < body::kJointCount; ++j) {
+      const double angle = 0.25 * std::sin(0.2 * f + 1.7 * j);
+      clip.rotations.insert(clip.rotations.end(), {static_cast<float>(std::cos(angle / 2)), static_cast<float>(std::sin(angle / 2)), 0, 0});
+    }
+  }
+  throw_if_error(ports::write_file_atomically(path, value_or_throw(write_package(clip.view(), {.tool = "test"}), path)), path);
+}
+
+struct Workplace {
+  TemporaryFolder folder;
+  Workplace() {
+    write_motion(folder.path("swinging.fgn"));
+    train::write_json(folder.path("recipe.json"), testing_tools::small_recipe());
+  }
+  BuildOptions options(const std::string& state) const {
+    return {.recipe = folder.path("recipe.json"), .state = folder.path(state), .makehuman = {}, .slots = 2, .quiet = true};
+  }
+};
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void expect_same_weights(const std::string& a, const std::string& b) {
+  const train::PackageFile first = train::open_package(a, PackageKind::kAvatar), second = train::open_package(b, PackageKind::kAvatar);
+  const Network &one = first.package.avatar().network, &other = second.package.avatar().network;
+  ASSERT_EQ(one.layers.size(), other.layers.size());
+  for (size_t i = 0; i < one.layers.size(); ++i) {
+    EXPECT_TRUE(std::ranges::equal(one.layers[i].weights, other.layers[i].weights)) << a << " layer " << i;
+    EXPECT_TRUE(std::ranges::equal(one.layers[i].bias, other.layers[i].bias)) << a << " layer " << i;
+  }
+}
+
+size_t entries(const std::string& folder) {
+  return fs::exists(folder) ? static_cast<size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator())) : 0;
+}
+
+TEST(BuildPopulation, LeavesMembersTableSplitAndPackage) {
+  const Workplace place;
+  build(place.options("state"));
+  const State state{place.folder.path("state")};
+  const train::PackageFile package = train::open_package(state.package(), PackageKind::kPopulation);
+  const Population& population = package.package.population();
+  ASSERT_EQ(population.size(), 4u);
+  for (size_t m = 0; m < 4; ++m) {
+    EXPECT_EQ(population.members[m].name, kPeople[m]);
+    EXPECT_TRUE(fs::exists(state.sheet(kPeople[m])));
+  }
+  EXPECT_EQ(population.members[3].split, Split::kTest);
+  const nlohmann::json row = train::read_json(state.row("000010"));
+  EXPECT_EQ(row.at("split"), "test");
+  EXPECT_GT(row.at("quality").at("held_out_views").at("psnr_db").get<double>(), 10);
+  EXPECT_TRUE(row.at("frozen_pose").at("held_out_views").at("psnr_db").is_number());
+  EXPECT_LT(std::abs(row.at("rounding").at("views").at("loss_db").get<double>()), 1);
+  EXPECT_FALSE(train::read_json(state.row("000000")).contains("rounding"));
+  EXPECT_EQ(train::read_json(state.split()).at("train").size(), 3u);
+  EXPECT_NE(bytes_of(state.table()).find("000010,test,finished"), std::string::npos);
+  EXPECT_EQ(entries(state.captures()) + entries(state.folder + "/runs"), 0u);
+  EXPECT_FALSE(fs::exists(state.initial() + "/rounds"));
+  // Two rounds' rows under the head.
+  const std::string history = bytes_of(state.initial() + "/history.csv");
+  EXPECT_EQ(std::count(history.begin(), history.end(), '\n'), 3);
+
+  // Called again it makes nothing; another recipe is refused.
+  const fs::file_time_type before = fs::last_write_time(state.member("000001"));
+  build(place.options("state"));
+  EXPECT_EQ(fs::last_write_time(state.member("000001")), before);
+  nlohmann::json other = testing_tools::small_recipe();
+  other["training"]["iterations"] = 41;
+  train::write_json(place.folder.path("recipe.json"), other);
+  try {
+    build(place.options("state"));
+    FAIL() << "went on with another recipe";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("training: differs from"), std::string::npos) << error.what();
+  }
+}
+
+TEST(BuildPopulation, KilledAnywhereItGoesOnToTheSameBits) {
+  const Workplace place;
+  build(place.options("straight"));
+  // Killed at growing distances from its start, until a build lives to its end.
+  int kills = 0;
+  for (int delay_ms = 400;; delay_ms += 700) {
+    ASSERT_LT(kills, 60);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      try {
+        build(place.options("killed"));
+      } catch (...) {
+        _exit(1);
+      }
+      _exit(0);
+    }
+    int status = 0;
+    for (int waited_ms = 0; waitpid(child, &status, WNOHANG) == 0; waited_ms += 10) {
+      if (waited_ms == delay_ms) kill(child, SIGKILL);
+      usleep(10000);
+    }
+    if (WIFEXITED(status)) {
+      ASSERT_EQ(WEXITSTATUS(status), 0);
+      break;
+    }
+    ++kills;
+    usleep(300000);  // the children of the killed one notice, save and leave
+  }
+  EXPECT_GT(kills, 1);
+  const State straight{place.folder.path("straight")}, killed{place.folder.path("killed")};
+  EXPECT_EQ(bytes_of(straight.initial_weights()), bytes_of(killed.initial_weights()));
+  for (const char* name : kPeople) expect_same_weights(straight.member(name), killed.member(name));
+}
+
+TEST(BuildPopulation, AMemberThatFailsTakesNoOtherWithIt) {
+  const Workplace place;
+  const State state{place.folder.path("state")};
+  fs::create_directories(state.captures() + "/000001");
+  std::ofstream(state.captures() + "/000001/figurine.json") << "{\"version\": 1, \"compl";
+  testing::internal::CaptureStderr();
+  try {
+    build(place.options("state"));
+    ADD_FAILURE() << "said nothing";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("1 of 4 members failed"), std::string::npos) << error.what();
+  }
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
+  EXPECT_NE(said.find("000001: "), std::string::npos) << said;
+  EXPECT_NE(said.find("figurine.json"), std::string::npos) << said;
+  EXPECT_EQ(train::open_package(state.package(), PackageKind::kPopulation).package.population().size(), 3u);
+  EXPECT_NE(bytes_of(state.table()).find("000001,train,failed"), std::string::npos);
+  // Mended, the build goes on with that one alone.
+  fs::remove_all(state.captures() + "/000001");
+  build(place.options("state"));
+  EXPECT_EQ(train::open_package(state.package(), PackageKind::kPopulation).package.population().size(), 4u);
+}
+
+}  // namespace
+}  // namespace figurine::population

@@ -1,0 +1,223 @@
+#include "toolchain/population/build.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "formats/writer/package_writer.h"
+#include "ports/linux/files.h"
+#include "toolchain/body/clip.h"
+#include "toolchain/body/makehuman_model.h"
+#include "toolchain/body/mannequin.h"
+#include "toolchain/body/texel_body.h"
+#include "toolchain/error.h"
+#include "toolchain/population/initial_weights.h"
+#include "toolchain/population/member.h"
+#include "toolchain/train/interrupt.h"
+#include "toolchain/train/pack_population.h"
+#include "toolchain/train/progress.h"
+#include "toolchain/train/run_directory.h"
+#include "toolchain/train/slots.h"
+
+namespace figurine::population {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+void make_folder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) throw InputError(path + ": cannot be created: " + error.message());
+}
+
+// The recipe in the folder stays what it was: members of two recipes are no population.
+void keep_recipe(const BuildOptions& options, const State& state) {
+  const nlohmann::json now = train::read_json(options.recipe);
+  if (!fs::exists(state.recipe())) return train::write_json(state.recipe(), now);
+  const nlohmann::json before = train::read_json(state.recipe());
+  for (const auto& [key, value] : now.items()) {
+    if (key != "about" && before.value(key, nlohmann::json()) != value) {
+      throw InputError(options.recipe + ": " + key + ": differs from " + state.recipe() + "; another recipe needs another folder");
+    }
+  }
+}
+
+body::BodyModel body_model(const Recipe& recipe, const BuildOptions& options) {
+  if (recipe.mannequin) return body::make_mannequin();
+  if (options.makehuman.empty()) throw InputError("--makehuman: no directory given and FIGURINE_MAKEHUMAN is not set");
+  return body::make_makehuman_model(body::MakeHuman::load(options.makehuman), {});
+}
+
+void make_body(const Recipe& recipe, const BuildOptions& options, const State& state) {
+  if (fs::exists(state.body())) return;
+  const uint32_t uv_size = train::find_preset(recipe.training.preset).uv_size;
+  const body::BodyModel model = body_model(recipe, options);
+  const body::TexelBody texels = body::make_texel_body(model, uv_size);
+  Provenance provenance = model.provenance;
+  provenance.tool = "figurine-train " FIGURINE_VERSION;
+  provenance.settings.insert(provenance.settings.begin(), {"command", "body --uv " + std::to_string(uv_size)});
+  throw_if_error(ports::write_file_atomically(state.body(), value_or_throw(write_package(texels.view(), provenance), state.body())), "cannot save");
+}
+
+struct Motions {
+  std::vector<body::MotionClip> clips;
+  std::vector<std::string> sources;
+};
+
+Motions read_motions(const Recipe& recipe, const std::string& recipe_path, const Body& body) {
+  Motions motions;
+  for (const MotionPiece& piece : recipe.motions) {
+    const std::string path = find_clip(piece.clip, recipe_path);
+    if (fs::path(path).extension() == ".fgn" && (piece.start || piece.frames)) {
+      throw InputError(recipe_path + ": motions: " + piece.clip + ": start and frames are for clips, this is a motion package");
+    }
+    body::RetargetOptions retarget;
+    retarget.name = piece.name, retarget.start = piece.start, retarget.frames = piece.frames;
+    motions.clips.push_back(body::read_clip(path, body, retarget));
+    const std::string source = body::clip_source(path);
+    if (std::find(motions.sources.begin(), motions.sources.end(), source) == motions.sources.end()) motions.sources.push_back(source);
+  }
+  return motions;
+}
+
+struct TableRow {
+  Identity identity;
+  std::string status = "waiting", reason;
+  nlohmann::json row;  // members/ID.json
+};
+
+// Reasons are one line of words of ours and of file names: quotes are doubled, as RFC 4180 asks.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c == '\n' ? ' ' : c);
+  return out + '"';
+}
+
+// Empty where nothing was held out.
+std::string figure(const nlohmann::json& value, const char* format) {
+  char digits[32] = "";
+  if (value.is_number()) std::snprintf(digits, sizeof(digits), format, value.get<double>());
+  return digits;
+}
+
+std::string figures(const nlohmann::json& row) {
+  if (!row.is_object()) return ",,,,,,";
+  const nlohmann::json& quality = row.at("quality");
+  std::string text = "," + figure(row.at("train_seconds"), "%.1f") + "," + figure(row.at("capture_cpu_seconds"), "%.1f");
+  text += "," + figure(quality.at("held_out_views").at("psnr_db"), "%.2f");
+  for (const char* metric : {"psnr_db", "flat_psnr_db", "head_psnr_db"}) text += "," + figure(quality.at("held_out_poses").at(metric), "%.2f");
+  return text;
+}
+
+void save_table(const State& state, const std::vector<TableRow>& table) {
+  std::string text = "identity,split,status,train_seconds,capture_cpu_seconds,psnr_view_db,psnr_pose_db,flat_psnr_db,head_psnr_db,reason\n";
+  for (const TableRow& row : table) {
+    text += row.identity.name() + "," + to_string(row.identity.split) + "," + row.status + figures(row.row) + ",";
+    text += (row.reason.empty() ? "" : quoted(row.reason)) + "\n";
+  }
+  throw_if_error(ports::write_file_atomically(state.table(), std::as_bytes(std::span(text))), "cannot save");
+}
+
+void pack(const Recipe& recipe, const State& state) {
+  train::PackPopulationOptions options{.inputs = {state.members()}, .name = recipe.name, .init = recipe.training.init, .split = state.split(), .quiet = true};
+  throw_if_error(ports::write_file_atomically(state.package(), train::pack_population(options)), "cannot save");
+}
+
+// LibTorch starts threads, and a process that has some must not be forked: whatever calls it runs in a process of its own.
+std::string pack_apart(const Recipe& recipe, const State& state) {
+  std::string failure;
+  const auto ended = [&](size_t, const train::JobResult& result) {
+    if (!result.done) failure = result.text;
+  };
+  train::run_in_slots(1, {}, [&](size_t) { return pack(recipe, state), std::string(); }, ended, [] {});
+  return failure;
+}
+
+// All members that are not there yet, several at a time.
+void make_members(const BuildOptions& options, const Workshop& workshop, std::vector<TableRow>& table, train::Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto late = [&] {
+    return options.stop_after_s > 0 && std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > options.stop_after_s;
+  };
+  std::vector<size_t> missing;
+  size_t done = 0, failed = 0, since_packed = 0;
+  for (size_t i = 0; i < table.size(); ++i) {
+    const std::string name = table[i].identity.name();
+    if (fs::exists(workshop.state.row(name)) && fs::exists(workshop.state.member(name))) {
+      table[i].row = train::read_json(workshop.state.row(name)), table[i].status = "finished", ++done;
+    } else {
+      missing.push_back(i);
+    }
+  }
+  save_table(workshop.state, table);
+  const auto job = [&](size_t m) {
+    if (late()) throw train::Interrupted("not begun: the time given is over");
+    return make_member(workshop, table[missing[m]].identity).dump();
+  };
+  const auto ended = [&](size_t m, const train::JobResult& result) {
+    TableRow& row = table[missing[m]];
+    row.status = result.done ? "finished" : result.interrupted ? "waiting" : "failed";
+    if (result.done) {
+      row.row = nlohmann::json::parse(result.text), ++done, ++since_packed;
+    } else if (!result.interrupted) {
+      row.reason = result.text, ++failed;
+      std::fprintf(stderr, "figurine-train: %s: %s\n", row.identity.name().c_str(), row.reason.c_str());
+    }
+    save_table(workshop.state, table);
+  };
+  const auto waiting = [&] {
+    progress.show(static_cast<double>(done + failed) / static_cast<double>(table.size()),
+                  std::to_string(done) + " of " + std::to_string(table.size()) + " members, " + std::to_string(failed) + " failed");
+  };
+  // In pieces, so that the package can be written between: it needs LibTorch, so a process, so a moment without others' results.
+  const size_t piece = options.pack_period > 0 ? options.pack_period : std::max<size_t>(1, missing.size());
+  for (size_t first = 0; first < missing.size() && !late(); first += piece) {
+    const size_t count = std::min(piece, missing.size() - first);
+    train::run_in_slots(count, {.slots = options.slots}, [&](size_t m) { return job(first + m); },
+                        [&](size_t m, const train::JobResult& result) { ended(first + m, result); }, waiting);
+    if (first + count < missing.size() && since_packed > 0) {
+      if (const std::string failure = pack_apart(workshop.recipe, workshop.state); !failure.empty()) progress.say("not packed yet: " + failure);
+      since_packed = 0;
+    }
+  }
+}
+
+}  // namespace
+
+void build(const BuildOptions& options) {
+  Recipe recipe = read_recipe(options.recipe);
+  const State state{options.state};
+  make_folder(state.members());
+  keep_recipe(options, state);
+  train::write_json(state.split(), split_of(recipe));
+  make_body(recipe, options, state);
+  const train::PackageFile body = train::open_package(state.body(), PackageKind::kBody);
+  const Motions motions = read_motions(recipe, options.recipe, body.package.body());
+  const Workshop workshop{recipe, state, body, motions.clips, motions.sources, options.makehuman};
+
+  train::Progress progress(recipe.name, options.quiet);
+  make_initial_weights(workshop, options.slots, [&](const InitialWeightsProgress& at) {
+    char line[96];
+    std::snprintf(line, sizeof(line), "initial weights, round %u of %u, training PSNR %.2f dB", at.round, at.rounds, at.psnr_db);
+    progress.show(static_cast<double>(at.round) / static_cast<double>(at.rounds), line);
+  });
+  if (recipe.initial.rounds > 0) recipe.training.init = state.initial_weights();
+  if (options.initial_weights_only) return;
+
+  std::vector<TableRow> table;
+  for (const Identity& identity : identities_of(recipe)) table.push_back({.identity = identity, .reason = {}, .row = {}});
+  make_members(options, workshop, table, progress);
+  if (const std::string failure = pack_apart(recipe, state); !failure.empty()) throw InputError(failure);
+  size_t finished = 0, failed = 0;
+  for (const TableRow& row : table) finished += row.status == "finished", failed += row.status == "failed";
+  if (!options.quiet) {
+    std::printf("%s: %zu of %zu members, package %s, table %s\n", options.state.c_str(), finished, table.size(), state.package().c_str(),
+                state.table().c_str());
+  }
+  if (failed > 0) throw InputError(options.state + ": " + std::to_string(failed) + " of " + std::to_string(table.size()) + " members failed, see " + state.table());
+}
+
+}  // namespace figurine::population

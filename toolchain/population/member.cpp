@@ -1,0 +1,141 @@
+#include "toolchain/population/member.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "formats/writer/package_writer.h"
+#include "formats/writer/population_writer.h"
+#include "ports/linux/files.h"
+#include "toolchain/capture/capture.h"
+#include "toolchain/dataset/jpeg.h"
+#include "toolchain/error.h"
+#include "toolchain/evaluate/contact_sheet.h"
+#include "toolchain/evaluate/reconstruction.h"
+#include "toolchain/evaluate/requantization.h"
+#include "toolchain/model/unet.h"
+#include "toolchain/train/avatar_model.h"
+#include "toolchain/train/interrupt.h"
+#include "toolchain/train/pack_avatar.h"
+#include "toolchain/train/trainer.h"
+
+namespace figurine::population {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kSheetQuality = 85;
+
+double cpu_s() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+// Trains `run`, or finishes it, and opens what came of it.
+train::TrainedAvatar train(const Workshop& workshop, const std::string& data, const std::string& run, bool freeze_pose) {
+  train::TrainRequest request{.data = data,
+                              .body = workshop.state.body(),
+                              .run = run,
+                              .settings = workshop.recipe.training,
+                              .command = "figurine-train population " + workshop.recipe.name,
+                              .resume = fs::exists(train::RunDirectory{run}.run_json()),
+                              .quiet = true};
+  request.settings.freeze_pose = freeze_pose;
+  request.settings.threads = 1;
+  train::train_avatar(request);
+  return train::TrainedAvatar::open({.run = run, .data = {}, .body = {}, .threads = 1});
+}
+
+void save(const std::string& path, std::span<const std::byte> bytes) { throw_if_error(ports::write_file_atomically(path, bytes), "cannot save"); }
+
+// What the package's rounding costs this member: it is packed as a population of its own and looked at again.
+nlohmann::json rounding_loss(const Workshop& workshop, train::TrainedAvatar& avatar, std::span<const std::byte> package_bytes) {
+  const AlignedBytes own(package_bytes);
+  const Package package = value_or_throw(Package::open(own.bytes(), "member"), "member");
+  model::PoseUNet unet(package.avatar().network, {.precision = model::Precision::kFloat32, .seed = train::kInitialWeightsSeed});
+  if (!workshop.recipe.training.init.empty()) train::load_weights(workshop.recipe.training.init, unet);
+  std::vector<float> storage;
+  NewPopulation alone{.name = "alone", .initial = unet.export_network(storage), .coding = DifferenceCoding::kInt8};
+  alone.members.push_back({.avatar = &package.avatar(), .provenance = &package.provenance()});
+  const AlignedBytes rounded(value_or_throw(write_population(alone), "member"));
+  const Package opened = value_or_throw(Package::open(rounded.bytes(), "member"), "member");
+  std::vector<float> weights(member_floats(opened.population()));
+  const Avatar member = open_member(opened.population(), 0, weights);
+  return evaluate::evaluate_requantization(avatar, member, {.view_frame_step = workshop.recipe.view_frame_step, .quiet = true});
+}
+
+bool contains(const std::vector<uint32_t>& list, uint32_t number) { return std::find(list.begin(), list.end(), number) != list.end(); }
+
+nlohmann::json about_person(const std::string& data) {
+  const nlohmann::json capture = train::read_json(data + "/figurine.json");
+  return capture.value("person", nlohmann::json::object());
+}
+
+}  // namespace
+
+void capture_identity(const Workshop& workshop, const Identity& identity, const std::string& folder) {
+  const train::InterruptGuard interrupt;
+  capture::CaptureRequest request{.output = folder,
+                                  .makehuman = workshop.makehuman,
+                                  .seed = workshop.recipe.seed,
+                                  .first_identity = identity.number,
+                                  .identities = 1,
+                                  .frames = workshop.recipe.frames,
+                                  .rig = workshop.recipe.rig,
+                                  .resume = true,
+                                  .threads = 1,
+                                  .limits = identity.group->limits,
+                                  .tool = "figurine-train " FIGURINE_VERSION,
+                                  .sources = workshop.sources};
+  const capture::CaptureEnd end = capture::capture_identities(request, workshop.body.package, workshop.motions,
+                                                              [&](const capture::CaptureProgress&) { return !interrupt.requested(); });
+  if (end == capture::CaptureEnd::kStopped) throw train::Interrupted(identity.name() + ": stopped while it was captured");
+}
+
+nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
+  const State& state = workshop.state;
+  const std::string name = identity.name(), run = state.run(name);
+  const std::string data = state.captures() + "/" + name;
+  const auto clean_up = [&] {
+    for (const std::string& folder : {run, state.frozen_run(name), data}) fs::remove_all(folder);
+  };
+  if (fs::exists(state.row(name)) && fs::exists(state.member(name))) {
+    clean_up();  // it may have been killed just before
+    return train::read_json(state.row(name));
+  }
+  const double capture_start = cpu_s();
+  capture_identity(workshop, identity, state.captures());
+  const double capture_seconds = cpu_s() - capture_start;
+
+  train::TrainedAvatar avatar = train(workshop, data, run, false);
+  const evaluate::ReconstructionOptions looking{.quiet = true, .view_frame_step = workshop.recipe.view_frame_step};
+  const nlohmann::json quality = evaluate::evaluate_reconstruction(avatar, looking);
+  train::write_json(train::RunDirectory{run}.evaluation(), quality);
+  const std::vector<std::byte> package = train::pack_avatar(avatar, {run}, {.golden = false});
+  const nlohmann::json description = train::read_json(train::RunDirectory{run}.run_json());
+  nlohmann::json row{{"identity", name},
+                     {"split", to_string(identity.split)},
+                     {"person", about_person(data)},
+                     {"iterations", description.at("iterations")},
+                     {"train_seconds", description.at("train_seconds")},
+                     {"capture_cpu_seconds", capture_seconds},
+                     {"training_psnr_db", description.at("running").at("psnr_db")},
+                     {"quality", quality}};
+  if (contains(workshop.recipe.rounded, identity.number)) row["rounding"] = rounding_loss(workshop, avatar, package);
+  if (contains(workshop.recipe.frozen, identity.number)) {
+    train::TrainedAvatar frozen = train(workshop, data, state.frozen_run(name), true);
+    row["frozen_pose"] = evaluate::evaluate_reconstruction(frozen, looking);
+  }
+  save(state.sheet(name), dataset::encode_jpeg(evaluate::make_contact_sheet(avatar, {.pairs = 3, .person_height_px = 320}), kSheetQuality));
+  save(state.member(name), package);
+  train::write_json(state.row(name), row);
+  clean_up();
+  return row;
+}
+
+}  // namespace figurine::population
