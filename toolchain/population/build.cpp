@@ -59,7 +59,8 @@ void make_body(const Recipe& recipe, const BuildOptions& options, const State& s
   Provenance provenance = model.provenance;
   provenance.tool = "figurine-train " FIGURINE_VERSION;
   provenance.settings.insert(provenance.settings.begin(), {"command", "body --uv " + std::to_string(uv_size)});
-  throw_if_error(ports::write_file_atomically(state.body(), value_or_throw(write_package(texels.view(), provenance), state.body())), "cannot save");
+  throw_if_error(ports::write_file_atomically(state.body(), value_or_throw(write_package(texels.view(), provenance), state.body())),
+                 "cannot save");
 }
 
 struct Motions {
@@ -108,7 +109,8 @@ std::string figures(const nlohmann::json& row) {
   const nlohmann::json& quality = row.at("quality");
   std::string text = "," + figure(row.at("train_seconds"), "%.1f") + "," + figure(row.at("capture_cpu_seconds"), "%.1f");
   text += "," + figure(quality.at("held_out_views").at("psnr_db"), "%.2f");
-  for (const char* metric : {"psnr_db", "flat_psnr_db", "head_psnr_db"}) text += "," + figure(quality.at("held_out_poses").at(metric), "%.2f");
+  for (const char* metric : {"psnr_db", "flat_psnr_db", "head_psnr_db"})
+    text += "," + figure(quality.at("held_out_poses").at(metric), "%.2f");
   return text;
 }
 
@@ -122,7 +124,8 @@ void save_table(const State& state, const std::vector<TableRow>& table) {
 }
 
 void pack(const Recipe& recipe, const State& state) {
-  train::PackPopulationOptions options{.inputs = {state.members()}, .name = recipe.name, .init = recipe.training.init, .split = state.split(), .quiet = true};
+  train::PackPopulationOptions options{
+      .inputs = {state.members()}, .name = recipe.name, .init = recipe.training.init, .split = state.split(), .quiet = true};
   throw_if_error(ports::write_file_atomically(state.package(), train::pack_population(options)), "cannot save");
 }
 
@@ -140,7 +143,8 @@ std::string pack_apart(const Recipe& recipe, const State& state) {
 void make_members(const BuildOptions& options, const Workshop& workshop, std::vector<TableRow>& table, train::Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   const auto late = [&] {
-    return options.stop_after_s > 0 && std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > options.stop_after_s;
+    return options.stop_after_s > 0 &&
+           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > options.stop_after_s;
   };
   std::vector<size_t> missing;
   size_t done = 0, failed = 0, since_packed = 0;
@@ -176,10 +180,12 @@ void make_members(const BuildOptions& options, const Workshop& workshop, std::ve
   const size_t piece = options.pack_period > 0 ? options.pack_period : std::max<size_t>(1, missing.size());
   for (size_t first = 0; first < missing.size() && !late(); first += piece) {
     const size_t count = std::min(piece, missing.size() - first);
-    train::run_in_slots(count, {.slots = options.slots}, [&](size_t m) { return job(first + m); },
-                        [&](size_t m, const train::JobResult& result) { ended(first + m, result); }, waiting);
+    train::run_in_slots(
+        count, {.slots = options.slots}, [&](size_t m) { return job(first + m); },
+        [&](size_t m, const train::JobResult& result) { ended(first + m, result); }, waiting);
     if (first + count < missing.size() && since_packed > 0) {
-      if (const std::string failure = pack_apart(workshop.recipe, workshop.state); !failure.empty()) progress.say("not packed yet: " + failure);
+      if (const std::string failure = pack_apart(workshop.recipe, workshop.state); !failure.empty())
+        progress.say("not packed yet: " + failure);
       since_packed = 0;
     }
   }
@@ -217,7 +223,9 @@ void build(const BuildOptions& options) {
     std::printf("%s: %zu of %zu members, package %s, table %s\n", options.state.c_str(), finished, table.size(), state.package().c_str(),
                 state.table().c_str());
   }
-  if (failed > 0) throw InputError(options.state + ": " + std::to_string(failed) + " of " + std::to_string(table.size()) + " members failed, see " + state.table());
+  if (failed > 0)
+    throw InputError(options.state + ": " + std::to_string(failed) + " of " + std::to_string(table.size()) + " members failed, see " +
+                     state.table());
 }
 
 }  // namespace figurine::population

@@ -12,9 +12,9 @@ struct BuildOptions {
   std::string recipe;  // file
   std::string state;   // folder
   std::string makehuman;
-  unsigned slots = 1;           // processes of one thread
-  uint32_t pack_period = 30;    // members between two writings of the package; 0: at the end alone
-  double stop_after_s = 0;      // starts no further member then; what runs is finished. 0: never
+  unsigned slots = 1;         // processes of one thread
+  uint32_t pack_period = 30;  // members between two writings of the package; 0: at the end alone
+  double stop_after_s = 0;    // starts no further member then; what runs is finished. 0: never
   bool initial_weights_only = false;
   bool quiet = false;
 };

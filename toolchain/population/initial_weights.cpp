@@ -118,7 +118,8 @@ train::TensorFile reptile_step(const train::TensorFile& weights, const std::vect
     if (step < 1 && (old == weights.tensors.end() || old->second.shape != first.shape)) throw InputError(name + ": is not in the weights");
     for (const train::TensorFile& file : fine_tuned) {
       const auto found = file.tensors.find(name);
-      if (found == file.tensors.end() || found->second.shape != first.shape) throw InputError(name + ": fine-tuned weights differ in shape");
+      if (found == file.tensors.end() || found->second.shape != first.shape)
+        throw InputError(name + ": fine-tuned weights differ in shape");
     }
     for (size_t i = 0; i < out.values.size(); ++i) {
       double mean = 0;
@@ -146,8 +147,9 @@ void make_initial_weights(const Workshop& workshop, unsigned slots, const std::f
   const std::string captures = state.initial() + "/captures";
   const std::vector<Identity> people = learners(workshop.recipe);
   show({.round = 0, .rounds = recipe.rounds});
-  run_all(people.size(), slots, [&](size_t i) { return capture_identity(workshop, people[i], captures), std::string(); },
-          [&](size_t i) { return people[i].name(); });
+  run_all(
+      people.size(), slots, [&](size_t i) { return capture_identity(workshop, people[i], captures), std::string(); },
+      [&](size_t i) { return people[i].name(); });
 
   uint32_t round = rounds.done(recipe.rounds);
   std::string history = round > 0 ? read_text(rounds.history(round)) : kHistoryHead;

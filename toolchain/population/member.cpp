@@ -51,7 +51,9 @@ train::TrainedAvatar train(const Workshop& workshop, const std::string& data, co
   return train::TrainedAvatar::open({.run = run, .data = {}, .body = {}, .threads = 1});
 }
 
-void save(const std::string& path, std::span<const std::byte> bytes) { throw_if_error(ports::write_file_atomically(path, bytes), "cannot save"); }
+void save(const std::string& path, std::span<const std::byte> bytes) {
+  throw_if_error(ports::write_file_atomically(path, bytes), "cannot save");
+}
 
 // What the package's rounding costs this member: it is packed as a population of its own and looked at again.
 nlohmann::json rounding_loss(const Workshop& workshop, train::TrainedAvatar& avatar, std::span<const std::byte> package_bytes) {

@@ -153,7 +153,7 @@ void check_groups(const Recipe& recipe, const std::string& path) {
   }
 }
 
-std::vector<std::string> only_test(const Recipe& recipe, std::vector<std::string> capture::WardrobeLimits::*excluded) {
+std::vector<std::string> only_test(const Recipe& recipe, std::vector<std::string> capture::WardrobeLimits::* excluded) {
   std::optional<std::set<std::string>> common;  // of all groups that are not test
   for (const IdentityGroup& group : recipe.groups) {
     if (group.split == Split::kTest) continue;
@@ -178,7 +178,8 @@ std::string Identity::name() const {
 Recipe read_recipe(const std::string& path) {
   const nlohmann::json text = train::read_json(path);
   const JsonField json(text, path);
-  allow_only(json, {"about", "name", "body", "preset", "seed", "motions", "capture", "groups", "initial_weights", "training", "evaluation"});
+  allow_only(json,
+             {"about", "name", "body", "preset", "seed", "motions", "capture", "groups", "initial_weights", "training", "evaluation"});
   Recipe recipe;
   recipe.name = json["name"].text();
   if (json.has("body")) {

@@ -30,10 +30,10 @@ struct IdentityGroup {
 
 // How the weights that all members start from are learnt (initial_weights.h).
 struct InitialWeightsRecipe {
-  uint32_t identities = 0;  // the first ones of the training part
-  uint32_t rounds = 0;      // 0: the common random weights are the initial ones
-  uint32_t per_round = 2;   // identities fine-tuned in a round, side by side
-  uint64_t iterations = 0;  // of a fine-tuning
+  uint32_t identities = 0;               // the first ones of the training part
+  uint32_t rounds = 0;                   // 0: the common random weights are the initial ones
+  uint32_t per_round = 2;                // identities fine-tuned in a round, side by side
+  uint64_t iterations = 0;               // of a fine-tuning
   double first_step = 0, last_step = 0;  // how far the weights move towards the fine-tuned ones, falling linearly over the rounds
   double learning_rate = 0;              // of a fine-tuning; training's if 0
 };
@@ -41,7 +41,7 @@ struct InitialWeightsRecipe {
 struct Recipe {
   std::string name;
   bool mannequin = false;  // the procedural body instead of MakeHuman's: needs no data
-  uint64_t seed = 1;  // of the people; identity k depends on (seed, k) alone
+  uint64_t seed = 1;       // of the people; identity k depends on (seed, k) alone
   std::vector<MotionPiece> motions;
   uint32_t frames = 0;  // of a capture
   capture::RigOptions rig;
