@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# A whole population and its figures: makes (or goes on with) the people of a recipe, packs them, looks at them, writes docs/results/population.json.
+#
+#   scripts/experiments/population.sh edge|nano [FOLDER]        FOLDER (default out/population) keeps every step
+#
+# May be stopped and killed at any time; called again it goes on. MINUTES limits how long new people are begun. On two quiet cores `edge` takes about
+# two hours and `nano` one and a half.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
+cd "$figurine_checkout"
+
+name=${1:?edge or nano} folder=${2:-out/population}
+scripts/setup toolchain
+scripts/run cmake --preset dev > /dev/null
+scripts/run cmake --build --preset dev --target figurine-train > /dev/null
+mkdir -p "$folder" docs/results
+export FIGURINE_COMMIT=${FIGURINE_COMMIT:-$(git rev-parse HEAD 2> /dev/null || echo unknown)}
+train() { scripts/run build/dev/toolchain/cli/figurine-train "$@"; }
+
+state=$folder/$name
+train population "toolchain/population/$name.json" ${MINUTES:+--stop-after "$MINUTES"} -o "$state"
+train evaluate members "$state/population.fgn" --body "$state/body.fgn" --wall "docs/population_$name.jpg" \
+  --interpolation "docs/interpolation_$name.jpg" -o "$state/report.json"
+scripts/run python3 scripts/experiments/population_report.py "$state" "$name" docs/results/population.json "scripts/experiments/population.sh $name"
+# The ten worst on held-out poses, worst first: truth left, avatar right in every pair.
+worst=()
+while read -r identity; do worst+=(-i "$state/members/$identity.jpg"); done < "$state/worst.txt"
+scripts/run ffmpeg -v error -y "${worst[@]}" -filter_complex \
+  "$(for k in $(seq 0 9); do printf '[%d]scale=-2:320,pad=700:320:0:0:0x808080,setsar=1[t%d];' "$k" "$k"; done)$(printf '[t%d]' $(seq 0 9))xstack=inputs=10:layout=$(
+    for k in $(seq 0 9); do printf '%d_%d%s' $((k % 2 * 700)) $((k / 2 * 320)) "$([ "$k" = 9 ] || printf '|')"; done)" \
+  -q:v 4 "docs/population_worst_$name.jpg"
