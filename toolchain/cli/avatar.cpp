@@ -27,7 +27,7 @@ constexpr uint32_t kDefaultOctaves = 5;
 struct AvatarArguments {
   std::string data, body, run;
   bool all = false, resume = false, quiet = false;
-  std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser;
+  std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser, standoff;
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay;
   std::optional<float> spacing_scale;
@@ -68,6 +68,10 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   if (arguments.precision) {
     settings.bf16 = *arguments.precision == "bf16" || (*arguments.precision == "auto" && train::has_fast_bf16());
   }
+  if (arguments.standoff)
+    settings.standoff_weight = *arguments.standoff == "on"    ? train::TrainSettings{}.standoff_weight
+                               : *arguments.standoff == "off" ? 0
+                                                              : std::stof(*arguments.standoff);
   if (arguments.background) {
     settings.background =
         choose(*arguments.background, {TrainingBackground::kBlack, TrainingBackground::kGrey, TrainingBackground::kRandom});
@@ -168,6 +172,10 @@ void add_avatar_command(CLI::App& app) {
       ->check(CLI::IsMember({"auto", "f32", "bf16"}));
   command->add_option("--background", arguments->background, "Behind prediction and truth in the loss (default grey)")
       ->check(CLI::IsMember({"black", "grey", "random"}));
+  command
+      ->add_option("--standoff", arguments->standoff,
+                   "Draw Gaussians to hair, skirts and shoes that stand off the skin: on (default), off, or a weight")
+      ->check(CLI::IsMember({"on", "off"}) | CLI::Range(0.0, 1000.0));
   command->add_option("--views-per-pose", arguments->views, "Images of one pose an iteration (default 1, as in the paper)")
       ->check(CLI::Range(1, 64));
   command->add_option("--poses", arguments->poses, "Poses an iteration, side by side on threads of their own (default 1)")

@@ -59,6 +59,16 @@ double SquaredError::psnr_db() const {
   return -10 * std::log10(mse());
 }
 
+Outline compare_outlines(const Picture& prediction, const Picture& truth) {
+  check_sizes(prediction, truth);
+  Outline outline;
+  for (size_t pixel = 0; pixel < truth.rgba.size() / 4; ++pixel) {
+    const bool in_truth = is_foreground(truth, pixel), in_prediction = is_foreground(prediction, pixel);
+    outline.add({.both = in_truth && in_prediction, .truth = in_truth, .prediction = in_prediction});
+  }
+  return outline;
+}
+
 SquaredError foreground_error(const Picture& prediction, const Picture& truth) { return foreground_error(prediction, truth, whole(truth)); }
 
 SquaredError foreground_error(const Picture& prediction, const Picture& truth, const Box& inside) {

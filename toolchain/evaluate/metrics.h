@@ -9,6 +9,8 @@
 //   prediction over truth.
 //               1 is as sharp as the truth; a blurred face passes PSNR and fails this.
 //   difference  PSNR of (frame t+1 - frame t), prediction against truth, over pixels that are foreground in both true frames: shimmer.
+//   outline     true alpha above 0.5 against predicted: intersection over union, and the share of the truth that the prediction leaves
+//   uncovered: what hair or a skirt is worth that was not learnt.
 //   flat        PSNR of a person of one colour (the best one for the very pixels it is judged on) with a perfect mask: what dark clothes
 //   give for free.
 #pragma once
@@ -57,6 +59,18 @@ SquaredError foreground_error(const Picture& prediction, const Picture& truth);
 SquaredError foreground_error(const Picture& prediction, const Picture& truth, const Box& inside);
 SquaredError crop_error(const Picture& prediction, const Picture& truth);
 SquaredError difference_error(const Picture& prediction0, const Picture& prediction1, const Picture& truth0, const Picture& truth1);
+
+// Pixels inside either outline, alpha above 0.5.
+struct Outline {
+  uint64_t both = 0, truth = 0, prediction = 0;
+  void add(const Outline& other) { both += other.both, truth += other.truth, prediction += other.prediction; }
+  double iou() const { return ratio(both, truth + prediction - both); }
+  double uncovered_share() const { return ratio(truth - both, truth); }
+
+ private:
+  static double ratio(uint64_t part, uint64_t whole) { return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole); }
+};
+Outline compare_outlines(const Picture& prediction, const Picture& truth);
 
 struct HighPass {
   double prediction = 0;  // energies

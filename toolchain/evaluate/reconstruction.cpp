@@ -19,6 +19,7 @@ constexpr float kHeadEnlarge = 0.15f;  // hair and beard stand out from the skin
 struct Group {
   SquaredError foreground, crop, head;
   HighPass sharpness, head_sharpness;
+  Outline outline;
   FlatColour flat;
   uint64_t images = 0;
 
@@ -30,6 +31,7 @@ struct Group {
       head.add(foreground_error(prediction, truth, head_box));
       head_sharpness.add(high_pass(prediction, truth, head_box));
     }
+    outline.add(compare_outlines(prediction, truth));
     flat.add(truth);
     ++images;
   }
@@ -45,7 +47,9 @@ nlohmann::json to_json(const Group& group) {
           {"crop_psnr_db", finite(group.crop.psnr_db())},
           {"head_psnr_db", finite(group.head.psnr_db())},
           {"highpass_ratio", finite(group.sharpness.ratio())},
-          {"head_highpass_ratio", finite(group.head_sharpness.ratio())}};
+          {"head_highpass_ratio", finite(group.head_sharpness.ratio())},
+          {"mask_iou", group.outline.iou()},
+          {"uncovered_share", group.outline.uncovered_share()}};
 }
 
 // The groups that an image of this role counts for.

@@ -103,6 +103,7 @@ nlohmann::json to_json(const TrainSettings& s) {
           {"views_per_pose", s.views_per_pose},
           {"poses_per_iteration", s.poses_per_iteration},
           {"loss", {{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}, {"lpips", 0.0}}},
+          {"standoff_weight", s.standoff_weight},
           {"background", to_string(s.background)},
           {"warmup_iterations", s.warmup_iterations},
           {"crop_margin_px", s.crop_margin_px},
@@ -143,6 +144,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     s.poses_per_iteration = json.value("poses_per_iteration", 1u);
     s.ssim_weight = json.at("loss").at("ssim").get<float>();
     s.mask_weight = json.at("loss").at("mask").get<float>();
+    s.standoff_weight = json.value("standoff_weight", 0.0f);
     s.background = parse(json.at("background").get<std::string>(), kBackgrounds, where + ": background");
     s.warmup_iterations = json.at("warmup_iterations").get<uint32_t>();
     s.crop_margin_px = json.at("crop_margin_px").get<uint32_t>();
@@ -157,6 +159,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     require(std::isfinite(value) && value > 0, where, "decoding: scales must be positive and finite");
   }
   require(s.schedule.peak > 0 && std::isfinite(s.schedule.peak), where, "learning_rate: must be positive and finite");
+  require(s.standoff_weight >= 0 && std::isfinite(s.standoff_weight), where, "standoff_weight: must be finite and not negative");
   require((s.schedule.budget.iterations > 0) != (s.schedule.budget.seconds > 0), where, "budget: iterations or seconds, one of both");
   require(s.views_per_pose >= 1 && s.views_per_pose <= 64, where, "views_per_pose: must be 1 to 64");
   require(s.poses_per_iteration >= 1 && s.poses_per_iteration <= 64, where, "poses_per_iteration: must be 1 to 64");

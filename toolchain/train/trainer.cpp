@@ -18,6 +18,7 @@
 #include "toolchain/train/progress.h"
 #include "toolchain/train/reference_gaussians.h"
 #include "toolchain/train/sample_feed.h"
+#include "toolchain/train/standoff.h"
 
 namespace figurine::train {
 
@@ -156,8 +157,9 @@ class Trainer {
     for (uint32_t i = 0; i < count; ++i) samples.push_back(feed.next());
     clock.add(state_.stages.data);
     std::vector<PoseResult> poses(count);
+    const double fade = standoff_fade(train::progress(settings_.schedule.budget, state_.iteration, state_.seconds));
     lanes_.run([&](unsigned lane) {
-      for (uint32_t i = lane; i < count; i += lanes) poses[i] = pose_iteration(samples[i], model_of(lane));
+      for (uint32_t i = lane; i < count; i += lanes) poses[i] = pose_iteration(samples[i], model_of(lane), fade);
     });
     for (size_t i = 0; i < count; i += lanes) add_stages(poses[i].stages);
     StageClock last;
@@ -185,7 +187,8 @@ class Trainer {
     sum.loss += stages.loss;
   }
 
-  PoseResult pose_iteration(const Sample& sample, AvatarModel& model) const {
+  // fade: what is left of the stand-off's weight.
+  PoseResult pose_iteration(const Sample& sample, AvatarModel& model, double fade) const {
     StageClock clock;
     PoseResult pose;
     model.unet().zero_gradients();
@@ -197,7 +200,7 @@ class Trainer {
       loss.backward();
       clock.add(pose.stages.unet_backward);
     } else {
-      pose.result = image_iteration(sample, head, model, clock, pose.stages);
+      pose.result = image_iteration(sample, head, model, fade, clock, pose.stages);
     }
     pose.gradients = model.unet().gradients();
     return pose;
@@ -205,9 +208,10 @@ class Trainer {
 
   // The graph is cut at the head and at the pictures, so that each part's backward pass can be timed and the views of a pose can share one
   // run of the network. Gradients are those of the mean loss of the views.
-  IterationResult image_iteration(const Sample& sample, const torch::Tensor& head, AvatarModel& model, StageClock& clock,
+  IterationResult image_iteration(const Sample& sample, const torch::Tensor& head, AvatarModel& model, double fade, StageClock& clock,
                                   StageSeconds& stages) const {
     const torch::Tensor head_leaf = head.detach().requires_grad_();
+    std::vector<double> pulls(fade * settings_.standoff_weight > 0 ? model.body().texel_position_m.size() : 0);
     const double share = 1.0 / static_cast<double>(sample.views.size());
     IterationResult result;
     for (const SampleView& view : sample.views) {
@@ -219,6 +223,7 @@ class Trainer {
           image_leaf, view.target, sample.background,
           {.ssim_weight = settings_.ssim_weight, .mask_weight = settings_.mask_weight, .threads = model.settings().threads}, &terms);
       (loss * (view.loss_scale * share)).backward();
+      if (!pulls.empty()) result.loss += add_pulls(model, view, image_leaf, fade * view.loss_scale * share, pulls);
       clock.add(stages.loss);
       image.backward(image_leaf.grad());
       clock.add(stages.splat_backward);
@@ -226,9 +231,20 @@ class Trainer {
       result.squared_error += terms.squared_error;
       result.foreground += terms.foreground;
     }
+    if (!pulls.empty()) add_offset_gradient(model.head_frame(sample.posed), pulls, head_leaf.grad().mutable_data_ptr<float>());
     head.backward(head_leaf.grad());
     clock.add(stages.unet_backward);
     return result;
+  }
+
+  // Of the picture that was rendered last; its share of the loss.
+  double add_pulls(AvatarModel& model, const SampleView& view, const torch::Tensor& image, double scale, std::vector<double>& pulls) const {
+    const StandoffView seen{.camera = &view.view.camera,
+                            .crop = view.view.crop,
+                            .alpha = image[3].const_data_ptr<float>(),
+                            .mask = view.target[3].const_data_ptr<float>()};
+    const StandoffOptions options{.weight = settings_.standoff_weight, .unit_m = settings_.decoding.offset_scale_m};
+    return scale * standoff_loss(seen, model.renderer().gaussians().position_m, options, scale, pulls);
   }
 
   [[noreturn]] void fail(const Sample& sample, const char* what) const {

@@ -105,6 +105,16 @@ TEST(FlatColour, EqualsTheErrorOfThatPicture) {
   EXPECT_NEAR(flat.error().psnr_db(), drawn_db, 0.05);
 }
 
+TEST(Outlines, AreComparedByUnionAndByWhatIsLeftUncovered) {
+  Picture truth = filled(4, 1, {0, 0, 0, 0}), prediction = truth;
+  for (int x : {0, 1, 2}) set(truth, x, 0, {9, 9, 9, 255});
+  for (int x : {2, 3}) set(prediction, x, 0, {9, 9, 9, 128});
+  set(prediction, 1, 0, {9, 9, 9, 127});  // below a half
+  EXPECT_DOUBLE_EQ(compare_outlines(prediction, truth).iou(), 0.25);
+  EXPECT_DOUBLE_EQ(compare_outlines(prediction, truth).uncovered_share(), 2.0 / 3);
+  EXPECT_EQ(compare_outlines(filled(1, 1, {}), filled(1, 1, {})).iou(), 0);
+}
+
 TEST(HighPass, OfEqualPicturesIsOneAndOfAFlatOneZero) {
   Picture truth = filled(9, 9, {0, 0, 0, 255});
   for (int y = 0; y < 9; ++y) {
