@@ -114,7 +114,9 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
   capture_identity(workshop, identity, state.captures());
   const double capture_seconds = cpu_s() - capture_start;
 
+  const double train_start = cpu_s();
   train::TrainedAvatar avatar = train(workshop, data, run, false);
+  const double train_cpu = cpu_s() - train_start;  // of this attempt: less than all of it after an interruption
   const evaluate::ReconstructionOptions looking{.quiet = true, .view_frame_step = workshop.recipe.view_frame_step};
   const nlohmann::json quality = evaluate::evaluate_reconstruction(avatar, looking);
   train::write_json(train::RunDirectory{run}.evaluation(), quality);
@@ -125,6 +127,7 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
                      {"person", about_person(data)},
                      {"iterations", description.at("iterations")},
                      {"train_seconds", description.at("train_seconds")},
+                     {"train_cpu_seconds", train_cpu},
                      {"capture_cpu_seconds", capture_seconds},
                      {"training_psnr_db", description.at("running").at("psnr_db")},
                      {"quality", quality}};
