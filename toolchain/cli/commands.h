@@ -15,5 +15,6 @@ void add_avatar_command(CLI::App& app);
 void add_pack_command(CLI::App& app);
 void add_population_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
+void add_evaluate_members_command(CLI::App& evaluate);  // below evaluate
 
 }  // namespace figurine::cli

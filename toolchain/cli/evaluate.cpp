@@ -1,5 +1,5 @@
 // figurine-train evaluate: how good a trained avatar is (reconstruction), what fixed point (quantization) and a population's rounding
-// (population) cost it, and whether the device draws the same (parity).
+// (population) cost it, and whether the device draws the same (parity). What a population is like (members) is in evaluate_members.cpp.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -220,6 +220,8 @@ void add_evaluate_command(CLI::App& app) {
   population->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
   population->add_option("-o,--output", arguments->output, "Report to write, JSON");
   population->callback([arguments] { run_population(*arguments); });
+
+  add_evaluate_members_command(*command);
 
   CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, before rounding to 8 bits");
   add_run_options(parity, arguments);
