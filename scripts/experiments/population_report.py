@@ -69,6 +69,7 @@ def main():
     if not rows:
         sys.exit(f"population_report.py: {folder}: has no members yet")
     report = read(folder / "report.json") or {}
+    report.get("distances", {}).pop("members", None)  # everybody's own neighbours stay in the folder: hundreds of rows
     parts = {part: [r for r in rows if r["split"] == part] for part in ("train", "validation", "test")}
     everybody = spread(rows)
     gain = frozen_gain(rows)

@@ -206,9 +206,14 @@ void build(const BuildOptions& options) {
 
   train::Progress progress(recipe.name, options.quiet);
   make_initial_weights(workshop, options.slots, [&](const InitialWeightsProgress& at) {
-    char line[96];
-    std::snprintf(line, sizeof(line), "initial weights, round %u of %u, training PSNR %.2f dB", at.round, at.rounds, at.psnr_db);
-    progress.show(static_cast<double>(at.round) / static_cast<double>(at.rounds), line);
+    char line[128];
+    if (at.captured < at.people) {
+      std::snprintf(line, sizeof(line), "initial weights, %zu of %zu people captured", at.captured, at.people);
+      return progress.show(0, line);
+    }
+    std::snprintf(line, sizeof(line), "initial weights, round %u of %u, training PSNR of the last %.2f dB", at.round + 1, at.rounds,
+                  at.psnr_db);
+    progress.show((at.round + at.share) / at.rounds, line);
   });
   if (recipe.initial.rounds > 0) recipe.training.init = state.initial_weights();
   if (options.initial_weights_only) return;

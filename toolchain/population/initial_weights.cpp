@@ -64,16 +64,18 @@ std::vector<Identity> learners(const Recipe& recipe) {
   return chosen;
 }
 
-// Runs all jobs and throws the first failure.
+// Runs all jobs and throws the first failure. waiting(number of those that have ended) is called between.
 std::vector<std::string> run_all(size_t count, unsigned slots, const std::function<std::string(size_t)>& job,
-                                 const std::function<std::string(size_t)>& name) {
+                                 const std::function<std::string(size_t)>& name, const std::function<void(size_t)>& waiting) {
   std::vector<std::string> results(count);
   std::string failure;
+  size_t finished = 0;
   const auto ended = [&](size_t i, const train::JobResult& result) {
+    ++finished;
     if (result.done) results[i] = result.text;
     if (!result.done && !result.interrupted && failure.empty()) failure = name(i) + ": " + result.text;
   };
-  train::run_in_slots(count, {.slots = slots}, job, ended, [] {});
+  train::run_in_slots(count, {.slots = slots}, job, ended, [&] { waiting(finished); });
   if (!failure.empty()) throw InputError("initial weights: " + failure);
   return results;
 }
@@ -146,10 +148,15 @@ void make_initial_weights(const Workshop& workshop, unsigned slots, const std::f
   make_folder(rounds.folder);
   const std::string captures = state.initial() + "/captures";
   const std::vector<Identity> people = learners(workshop.recipe);
-  show({.round = 0, .rounds = recipe.rounds});
+  InitialWeightsProgress at{.rounds = recipe.rounds, .people = people.size()};
+  const auto count_captures = [&](size_t finished) {
+    at.captured = finished;
+    show(at);
+  };
   run_all(
       people.size(), slots, [&](size_t i) { return capture_identity(workshop, people[i], captures), std::string(); },
-      [&](size_t i) { return people[i].name(); });
+      [&](size_t i) { return people[i].name(); }, count_captures);
+  at.captured = people.size();
 
   uint32_t round = rounds.done(recipe.rounds);
   std::string history = round > 0 ? read_text(rounds.history(round)) : kHistoryHead;
@@ -161,7 +168,12 @@ void make_initial_weights(const Workshop& workshop, unsigned slots, const std::f
                                   .init = round > 0 ? rounds.weights(round) : "",
                                   .seed = round + 1});
     };
-    const std::vector<std::string> results = run_all(recipe.per_round, slots, job, [&](size_t k) { return person(k).name(); });
+    const std::vector<std::string> results = run_all(
+        recipe.per_round, slots, job, [&](size_t k) { return person(k).name(); },
+        [&](size_t finished) {
+          at.round = round, at.share = static_cast<double>(finished) / recipe.per_round;
+          show(at);
+        });
     std::vector<train::TensorFile> fine_tuned;
     double psnr_db = 0, seconds = 0;
     for (size_t k = 0; k < results.size(); ++k) {
@@ -178,7 +190,7 @@ void make_initial_weights(const Workshop& workshop, unsigned slots, const std::f
     history += line;
     save_text(rounds.history(round + 1), history);
     forget(rounds, round, recipe.per_round);
-    show({.round = round + 1, .rounds = recipe.rounds, .psnr_db = psnr_db});
+    at.psnr_db = psnr_db;
   }
   save_text(state.initial() + "/history.csv", history);
   train::write_tensor_file(state.initial_weights(), train::read_tensor_file(rounds.weights(recipe.rounds)));

@@ -25,7 +25,9 @@ train::TensorFile reptile_step(const train::TensorFile& weights, const std::vect
 double reptile_step_size(const InitialWeightsRecipe& recipe, uint32_t round);
 
 struct InitialWeightsProgress {
+  size_t captured = 0, people = 0;  // first come the captures, then the rounds
   uint32_t round = 0, rounds = 0;
+  double share = 0;    // of the round
   double psnr_db = 0;  // training PSNR at the end of the last round's fine-tunings
 };
 

@@ -134,9 +134,8 @@ void add_offset_gradient(const model::HeadFrame& frame, std::span<const double> 
   for (uint32_t i = 0; i < body.texel_count(); ++i) {
     const double* d = &position_gradient[3 * size_t(i)];
     if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
-    const std::array<float, 12> m = blend(frame.world_from_rest, &body.texel_joints[size_t(i) * kSkinInfluences],
-                                          &body.texel_weights[size_t(i) * kSkinInfluences])
-                                        .m;
+    const std::array<float, 12> m =
+        blend(frame.world_from_rest, &body.texel_joints[size_t(i) * kSkinInfluences], &body.texel_weights[size_t(i) * kSkinInfluences]).m;
     float* const dh = head_gradient + size_t(body.texel[i]) * channels;
     for (int k = 0; k < 3; ++k) dh[k] += float(frame.decoding.offset_scale_m * (m[k] * d[0] + m[4 + k] * d[1] + m[8 + k] * d[2]));
   }
