@@ -54,7 +54,7 @@ struct Heights {
   uint32_t wall_px, mixture_px, close_px;
 };
 Heights heights_for(const Population& population) {
-  return population.network.input_size >= 64 ? Heights{200, 360, 420} : Heights{144, 176, 208};
+  return population.network.input_size >= 64 ? Heights{256, 360, 420} : Heights{144, 176, 208};
 }
 
 uint32_t rows_for(size_t members, uint32_t columns) { return uint32_t((members + columns - 1) / columns); }
