@@ -58,6 +58,26 @@ def frozen_gain(rows):
     return describe(gains)
 
 
+# What the shared initial weights are worth: the same people, the same budget, from random weights.
+def initial_weights(rows):
+    pairs = [r for r in rows if "from_scratch" in r]
+    if not pairs:
+        return None
+    curve = []
+    for k, (iteration, seconds, _) in enumerate(pairs[0]["log"]):
+        here = [(r["log"][k], r["from_scratch"]["log"][k]) for r in pairs]
+        curve.append(
+            {
+                "iteration": iteration,
+                "seconds": statistics.fmean(a[1] for a, _ in here),
+                "training_psnr_db": statistics.fmean(a[2] for a, _ in here),
+                "from_scratch_db": statistics.fmean(b[2] for _, b in here),
+            }
+        )
+    gain = lambda group: describe([metric(r, group, "psnr_db") - r["from_scratch"]["quality"][group]["psnr_db"] for r in pairs])
+    return {"gain_views_db": gain("held_out_views"), "gain_poses_db": gain("held_out_poses"), "curve": curve}
+
+
 def rounding(rows):
     losses = {f"{r['identity']} {g}": r["rounding"][g]["loss_db"] for r in rows if "rounding" in r for g in ("views", "poses")}
     return {"losses_db": losses, "worst_db": max(losses.values(), default=None)}
@@ -95,6 +115,7 @@ def main():
         "all": everybody,
         "by_split": {part: spread(of_part) for part, of_part in parts.items() if of_part},
         "gain_over_frozen_pose": gain,
+        "initial_weights": initial_weights(rows),
         "rounding": rounding(rows),
         "worst_ten": [
             {

@@ -39,7 +39,8 @@ void keep_recipe(const BuildOptions& options, const State& state) {
   if (!fs::exists(state.recipe())) return train::write_json(state.recipe(), now);
   const nlohmann::json before = train::read_json(state.recipe());
   for (const auto& [key, value] : now.items()) {
-    if (key != "about" && before.value(key, nlohmann::json()) != value) {
+    // What is measured beside does not change the members.
+    if (key != "about" && key != "evaluation" && before.value(key, nlohmann::json()) != value) {
       throw InputError(options.recipe + ": " + key + ": differs from " + state.recipe() + "; another recipe needs another folder");
     }
   }

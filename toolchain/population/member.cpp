@@ -36,8 +36,10 @@ double cpu_s() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
+enum class Variant : uint8_t { kMember, kFrozenPose, kFromScratch };
+
 // Trains `run`, or finishes it, and opens what came of it.
-train::TrainedAvatar train(const Workshop& workshop, const std::string& data, const std::string& run, bool freeze_pose) {
+train::TrainedAvatar train(const Workshop& workshop, const std::string& data, const std::string& run, Variant variant) {
   train::TrainRequest request{.data = data,
                               .body = workshop.state.body(),
                               .run = run,
@@ -45,7 +47,8 @@ train::TrainedAvatar train(const Workshop& workshop, const std::string& data, co
                               .command = "figurine-train population " + workshop.recipe.name,
                               .resume = fs::exists(train::RunDirectory{run}.run_json()),
                               .quiet = true};
-  request.settings.freeze_pose = freeze_pose;
+  request.settings.freeze_pose = variant == Variant::kFrozenPose;
+  if (variant == Variant::kFromScratch) request.settings.init.clear();
   request.settings.threads = 1;
   train::train_avatar(request);
   return train::TrainedAvatar::open({.run = run, .data = {}, .body = {}, .threads = 1});
@@ -72,6 +75,13 @@ nlohmann::json rounding_loss(const Workshop& workshop, train::TrainedAvatar& ava
 }
 
 bool contains(const std::vector<uint32_t>& list, uint32_t number) { return std::find(list.begin(), list.end(), number) != list.end(); }
+
+// [iteration, seconds, training PSNR] over the run.
+nlohmann::json training_log(const std::string& run) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (const train::LogRow& row : train::load_log({run}, UINT64_MAX)) rows.push_back({row.iteration, row.seconds, row.psnr_db});
+  return rows;
+}
 
 nlohmann::json about_person(const std::string& data) {
   const nlohmann::json capture = train::read_json(data + "/figurine.json");
@@ -104,7 +114,7 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
   const std::string name = identity.name(), run = state.run(name);
   const std::string data = state.captures() + "/" + name;
   const auto clean_up = [&] {
-    for (const std::string& folder : {run, state.frozen_run(name), data}) fs::remove_all(folder);
+    for (const std::string& folder : {run, state.frozen_run(name), state.scratch_run(name), data}) fs::remove_all(folder);
   };
   if (fs::exists(state.row(name)) && fs::exists(state.member(name))) {
     clean_up();  // it may have been killed just before
@@ -115,7 +125,7 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
   const double capture_seconds = cpu_s() - capture_start;
 
   const double train_start = cpu_s();
-  train::TrainedAvatar avatar = train(workshop, data, run, false);
+  train::TrainedAvatar avatar = train(workshop, data, run, Variant::kMember);
   const double train_cpu = cpu_s() - train_start;  // of this attempt: less than all of it after an interruption
   const evaluate::ReconstructionOptions looking{.quiet = true, .view_frame_step = workshop.recipe.view_frame_step};
   const nlohmann::json quality = evaluate::evaluate_reconstruction(avatar, looking);
@@ -133,8 +143,14 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
                      {"quality", quality}};
   if (contains(workshop.recipe.rounded, identity.number)) row["rounding"] = rounding_loss(workshop, avatar, package);
   if (contains(workshop.recipe.frozen, identity.number)) {
-    train::TrainedAvatar frozen = train(workshop, data, state.frozen_run(name), true);
+    train::TrainedAvatar frozen = train(workshop, data, state.frozen_run(name), Variant::kFrozenPose);
     row["frozen_pose"] = evaluate::evaluate_reconstruction(frozen, looking);
+  }
+  if (contains(workshop.recipe.scratch, identity.number)) {
+    train::TrainedAvatar scratch = train(workshop, data, state.scratch_run(name), Variant::kFromScratch);
+    row["from_scratch"] = {{"quality", evaluate::evaluate_reconstruction(scratch, looking)},
+                           {"log", training_log(state.scratch_run(name))}};
+    row["log"] = training_log(run);
   }
   save(state.sheet(name), dataset::encode_jpeg(evaluate::make_contact_sheet(avatar, {.pairs = 3, .person_height_px = 320}), kSheetQuality));
   save(state.member(name), package);

@@ -140,7 +140,8 @@ void check_groups(const Recipe& recipe, const std::string& path) {
   }
   if (!has_train) throw InputError(path + ": groups: none is of the part train");
   if (seen.size() > kMostPeople) throw InputError(path + ": groups: more than " + std::to_string(kMostPeople) + " people");
-  for (const auto& [field, list] : {std::pair{"frozen", &recipe.frozen}, std::pair{"rounded", &recipe.rounded}}) {
+  for (const auto& [field, list] :
+       {std::pair{"frozen", &recipe.frozen}, std::pair{"scratch", &recipe.scratch}, std::pair{"rounded", &recipe.rounded}}) {
     for (uint32_t number : *list) {
       if (!seen.contains(number)) throw InputError(path + ": " + field + ": identity " + std::to_string(number) + " is in no group");
     }
@@ -196,8 +197,9 @@ Recipe read_recipe(const std::string& path) {
   recipe.training = read_training(json["training"], json["preset"].text());
   if (json.has("evaluation")) {
     const JsonField evaluation = json["evaluation"];
-    allow_only(evaluation, {"frozen", "rounded", "view_frame_step"});
+    allow_only(evaluation, {"frozen", "scratch", "rounded", "view_frame_step"});
     if (evaluation.has("frozen")) recipe.frozen = numbers(evaluation["frozen"]);
+    if (evaluation.has("scratch")) recipe.scratch = numbers(evaluation["scratch"]);
     if (evaluation.has("rounded")) recipe.rounded = numbers(evaluation["rounded"]);
     if (evaluation.has("view_frame_step")) recipe.view_frame_step = count(evaluation["view_frame_step"], 1, 100000);
   }

@@ -49,6 +49,7 @@ struct Recipe {
   InitialWeightsRecipe initial;
   train::TrainSettings training;  // preset included; .init is the place of the initial weights once they are there
   std::vector<uint32_t> frozen;   // identities that are trained a second time with the body pose frozen, for comparison
+  std::vector<uint32_t> scratch;  // identities that are trained a second time from the common random weights, for comparison
   std::vector<uint32_t> rounded;  // identities whose loss by the package's rounding is measured
   uint32_t view_frame_step = 4;   // evaluation looks at every n-th training pose from held-out cameras
 };

@@ -26,6 +26,7 @@ struct State {
   std::string initial_weights() const { return initial() + "/weights.safetensors"; }
   std::string captures() const { return folder + "/captures"; }
   std::string run(const std::string& identity) const { return folder + "/runs/" + identity; }
+  std::string scratch_run(const std::string& identity) const { return folder + "/runs/" + identity + "_scratch"; }
   std::string frozen_run(const std::string& identity) const { return folder + "/runs/" + identity + "_frozen"; }
   std::string members() const { return folder + "/members"; }
   std::string member(const std::string& identity) const { return members() + "/" + identity + ".fgn"; }

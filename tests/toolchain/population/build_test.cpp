@@ -88,6 +88,8 @@ TEST(BuildPopulation, LeavesMembersTableSplitAndPackage) {
   EXPECT_EQ(row.at("split"), "test");
   EXPECT_GT(row.at("quality").at("held_out_views").at("psnr_db").get<double>(), 10);
   EXPECT_TRUE(row.at("frozen_pose").at("held_out_views").at("psnr_db").is_number());
+  EXPECT_TRUE(row.at("from_scratch").at("quality").at("held_out_views").at("psnr_db").is_number());
+  EXPECT_EQ(row.at("from_scratch").at("log").size(), row.at("log").size());
   EXPECT_LT(std::abs(row.at("rounding").at("views").at("loss_db").get<double>()), 1);
   EXPECT_FALSE(train::read_json(state.row("000000")).contains("rounding"));
   EXPECT_EQ(train::read_json(state.split()).at("train").size(), 3u);

@@ -14,7 +14,7 @@ inline nlohmann::json small_recipe() {
     "groups": [{"split": "train", "first": 0, "count": 3}, {"split": "test", "first": 10, "count": 1}],
     "initial_weights": {"identities": 2, "rounds": 2, "iterations": 20, "first_step": 0.5, "last_step": 0.25},
     "training": {"iterations": 40},
-    "evaluation": {"frozen": [10], "rounded": [10]}
+    "evaluation": {"frozen": [10], "scratch": [10], "rounded": [10]}
   })");
 }
 
