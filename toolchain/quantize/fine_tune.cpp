@@ -40,6 +40,7 @@ train::TrainSettings fine_tune_settings(const train::TrainSettings& of_run, cons
                        .floor_fraction = 0,
                        .budget = {.iterations = options.iterations, .seconds = 0}};
   settings.warmup_iterations = 0;
+  settings.standoff_weight = 0;  // what stands off has been found
   settings.bf16 = false;
   settings.threads = options.threads;
   return settings;

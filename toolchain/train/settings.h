@@ -50,7 +50,7 @@ struct TrainSettings {
   uint32_t poses_per_iteration = 1;  // each on its own share of the threads; their gradients are averaged
   float ssim_weight = 0.1f;
   float mask_weight = 0.1f;
-  float standoff_weight = 1;  // of the pull on Gaussians from mask that the picture leaves uncovered (standoff.h); 0: none
+  float standoff_weight = 4;  // of the pull on Gaussians from mask that the picture leaves uncovered (standoff.h); 0: none
   TrainingBackground background = TrainingBackground::kGrey;
   uint32_t warmup_iterations = 0;    // of fitting reference Gaussians before the first image
   uint32_t crop_margin_px = 16;      // around the box of the true mask

@@ -21,7 +21,7 @@
 namespace figurine::train {
 
 struct StandoffOptions {
-  float weight = 1;                  // of a pixel that is uncovered, beside the picture's L1
+  float weight = 4;                  // of a pixel that is uncovered, beside the picture's L1
   float reach_m = 0.012f;            // nearer Gaussians have a gradient of their own
   float soft_m = 0.02f;              // beyond reach_m + soft_m the pull is constant
   float unit_m = 0.05f;              // a distance that costs a whole pixel: HeadDecoding::offset_scale_m

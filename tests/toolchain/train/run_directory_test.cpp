@@ -130,8 +130,18 @@ TEST_F(RunDirectoryTest, SettingsReadBackEqual) {
   EXPECT_EQ(to_json(settings_from_json(json, "test")), json);
 }
 
+TEST_F(RunDirectoryTest, SettingsOfOlderRunsHaveNoStandoff) {
+  nlohmann::json json = to_json(preset_settings("nano"));
+  EXPECT_GT(settings_from_json(json, "run.json").standoff_weight, 0);
+  json.erase("standoff_weight");
+  EXPECT_EQ(settings_from_json(json, "run.json").standoff_weight, 0);
+}
+
 TEST_F(RunDirectoryTest, SettingsNameTheFieldThatIsWrong) {
   nlohmann::json json = to_json(preset_settings("nano"));
+  json["standoff_weight"] = -1;
+  EXPECT_THROW(settings_from_json(json, "run.json"), InputError);
+  json = to_json(preset_settings("nano"));
   json["threads"] = 0;
   EXPECT_THROW(settings_from_json(json, "run.json"), InputError);
   json = to_json(preset_settings("nano"));

@@ -31,7 +31,7 @@ TEST(Standoff, PullsTheNearestCentreStraightToTheUncoveredPixelsRay) {
   picture.mask[32 * kSize + 48] = 1;  // ray through (16.5/64, 0.5/64, 1)
   const std::vector<float> centres{0, 0.0078125f, 1, -0.4f, 0, 1};
   std::vector<double> gradient(6, 0.0);
-  const double loss = standoff_loss(picture.view(), centres, {}, 1, gradient);
+  const double loss = standoff_loss(picture.view(), centres, {.weight = 1}, 1, gradient);
   const double tangent = 16.5 / 64, rise = 0.5 / 64;
   const double distance = tangent * std::sqrt(1 + rise * rise) / std::sqrt(1 + tangent * tangent + rise * rise);
   EXPECT_NEAR(loss, (distance - 0.012 - 0.01) / (0.05 * kSize * kSize), 1e-6 / kSize);

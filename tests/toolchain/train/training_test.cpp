@@ -114,6 +114,33 @@ TEST(Training, OfSeveralPosesAnIterationGivesTheSameBitsOnOneThreadAndOnTwo) {
   EXPECT_NE(bytes_of(RunDirectory{one.run}.weights()), bytes_of(RunDirectory{side_by_side.run}.weights()));
 }
 
+// The mannequin has neither hair nor skirt, so the weights to start from hold all Gaussians 10 cm beside it.
+TEST(Training, WithStandoffGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  TensorFile weights = read_tensor_file(RunDirectory{trained_run()}.weights());
+  weights.tensors.at("layer.14.bias").values.at(0) += 2;
+  write_tensor_file(folder.path("beside.safetensors"), weights);
+  TrainRequest off = request(folder.path("off"), 30);
+  off.settings.init = folder.path("beside.safetensors");
+  off.settings.poses_per_iteration = 2;
+  off.settings.standoff_weight = 0;
+  train_avatar(off);
+  TrainRequest one = off;
+  one.run = folder.path("one");
+  one.settings.standoff_weight = preset_settings("nano").standoff_weight;
+  train_avatar(one);
+  TrainRequest two = one;
+  two.run = folder.path("two");
+  two.settings.threads = 2;
+  two.stop_after = 11;  // while it pulls
+  EXPECT_THROW(train_avatar(two), Interrupted);
+  two.stop_after = 0;
+  two.resume = true;
+  train_avatar(two);
+  EXPECT_TRUE(bytes_of(RunDirectory{one.run}.weights()) == bytes_of(RunDirectory{two.run}.weights()));
+  EXPECT_FALSE(bytes_of(RunDirectory{one.run}.weights()) == bytes_of(RunDirectory{off.run}.weights()));
+}
+
 TEST(Lanes, PassOnWhatTheLowestLaneThrewAndGoOn) {
   Lanes lanes(3, [] {});
   std::array<int, 3> calls{};
