@@ -98,6 +98,7 @@ std::string fine_tune(const Workshop& workshop, const FineTuning& tuning) {
   request.settings.init = tuning.init;
   request.settings.seed = tuning.seed;
   request.settings.schedule.budget = {.iterations = recipe.iterations, .seconds = 0};
+  if (recipe.standoff_weight) request.settings.standoff_weight = *recipe.standoff_weight;
   if (recipe.learning_rate > 0) request.settings.schedule.peak = recipe.learning_rate;
   train::train_avatar(request);
   // Not from its result: a run that was finished before does not know its means any more.
@@ -148,7 +149,7 @@ void make_initial_weights(const Workshop& workshop, unsigned slots, const std::f
   make_folder(rounds.folder);
   const std::string captures = state.initial() + "/captures";
   const std::vector<Identity> people = learners(workshop.recipe);
-  InitialWeightsProgress at{.rounds = recipe.rounds, .people = people.size()};
+  InitialWeightsProgress at{.people = people.size(), .rounds = recipe.rounds};
   const auto count_captures = [&](size_t finished) {
     at.captured = finished;
     show(at);

@@ -88,7 +88,7 @@ IdentityGroup read_group(const JsonField& json) {
 }
 
 InitialWeightsRecipe read_initial(const JsonField& json) {
-  allow_only(json, {"identities", "rounds", "per_round", "iterations", "first_step", "last_step", "learning_rate"});
+  allow_only(json, {"identities", "rounds", "per_round", "iterations", "first_step", "last_step", "learning_rate", "standoff_weight"});
   InitialWeightsRecipe initial{.identities = count(json["identities"], 1, kMostPeople),
                                .rounds = count(json["rounds"], 0, 100000),
                                .iterations = whole(json["iterations"], 1, 1u << 24),
@@ -96,18 +96,20 @@ InitialWeightsRecipe read_initial(const JsonField& json) {
                                .last_step = real(json["last_step"], 0, 1)};
   if (json.has("per_round")) initial.per_round = count(json["per_round"], 1, 64);
   if (json.has("learning_rate")) initial.learning_rate = real(json["learning_rate"], 1e-9, 1);
+  if (json.has("standoff_weight")) initial.standoff_weight = static_cast<float>(real(json["standoff_weight"], 0, 1000));
   return initial;
 }
 
 // What a recipe may say of training. All else is what `figurine-train avatar` does by default.
 train::TrainSettings read_training(const JsonField& json, const std::string& preset) {
-  allow_only(json, {"iterations", "views_per_pose", "poses", "learning_rate", "seed", "spacing_scale", "precision"});
+  allow_only(json, {"iterations", "views_per_pose", "poses", "learning_rate", "seed", "spacing_scale", "standoff_weight", "precision"});
   train::TrainSettings settings = train::preset_settings(preset);
   settings.schedule.budget = {.iterations = whole(json["iterations"], 1, 1u << 30), .seconds = 0};
   if (json.has("views_per_pose")) settings.views_per_pose = count(json["views_per_pose"], 1, 64);
   if (json.has("poses")) settings.poses_per_iteration = count(json["poses"], 1, 64);
   if (json.has("learning_rate")) settings.schedule.peak = real(json["learning_rate"], 1e-9, 1);
   if (json.has("spacing_scale")) settings.decoding.spacing_scale = static_cast<float>(real(json["spacing_scale"], 0.05, 5));
+  if (json.has("standoff_weight")) settings.standoff_weight = static_cast<float>(real(json["standoff_weight"], 0, 1000));
   if (json.has("seed")) settings.seed = json["seed"].whole();
   settings.bf16 = train::has_fast_bf16();
   if (json.has("precision")) {

@@ -36,6 +36,7 @@ struct InitialWeightsRecipe {
   uint64_t iterations = 0;               // of a fine-tuning
   double first_step = 0, last_step = 0;  // how far the weights move towards the fine-tuned ones, falling linearly over the rounds
   double learning_rate = 0;              // of a fine-tuning; training's if 0
+  std::optional<float> standoff_weight;  // of a fine-tuning; training's if not given
 };
 
 struct Recipe {
