@@ -212,8 +212,10 @@ void build(const BuildOptions& options) {
       std::snprintf(line, sizeof(line), "initial weights, %zu of %zu people captured", at.captured, at.people);
       return progress.show(0, line);
     }
-    std::snprintf(line, sizeof(line), "initial weights, round %u of %u, training PSNR of the last %.2f dB", at.round + 1, at.rounds,
-                  at.psnr_db);
+    const int length = std::snprintf(line, sizeof(line), "initial weights, round %u of %u", at.round + 1, at.rounds);
+    if (at.psnr_db > 0) {
+      std::snprintf(line + length, sizeof(line) - static_cast<size_t>(length), ", training PSNR of the last %.2f dB", at.psnr_db);
+    }
     progress.show((at.round + at.share) / at.rounds, line);
   });
   if (recipe.initial.rounds > 0) recipe.training.init = state.initial_weights();
