@@ -93,13 +93,18 @@ void train_all(const TrainAllOptions& options, const std::function<train::TrainR
       progress.say(rows[i].identity + ": training PSNR " + std::to_string(rows[i].psnr_db).substr(0, 5) + " dB after " +
                    train::format_duration(rows[i].seconds));
     }
-    save_table(table, rows);
+    try {
+      save_table(table, rows);
+    } catch (const InputError&) {
+      // The disk is full just now. Others may still finish; the last writing below says so if it still is.
+    }
   };
   const auto on_wait = [&] {
     progress.show(static_cast<double>(ended) / static_cast<double>(rows.size()),
                   std::to_string(ended) + " of " + std::to_string(rows.size()) + " identities, " + std::to_string(failed) + " failed");
   };
   train::run_in_slots(rows.size(), {.slots = options.slots}, job, on_end, on_wait);
+  save_table(table, rows);
   if (!options.quiet)
     std::printf("%s: %zu of %zu identities trained, table in %s\n", options.runs.c_str(), rows.size() - failed, rows.size(), table.c_str());
   if (failed > 0)

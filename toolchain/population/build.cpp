@@ -171,7 +171,11 @@ void make_members(const BuildOptions& options, const Workshop& workshop, std::ve
       row.reason = result.text, ++failed;
       std::fprintf(stderr, "figurine-train: %s: %s\n", row.identity.name().c_str(), row.reason.c_str());
     }
-    save_table(workshop.state, table);
+    try {
+      save_table(workshop.state, table);
+    } catch (const InputError&) {
+      // The disk is full just now. Others may still finish and leave room; the last writing below says so if not.
+    }
   };
   const auto waiting = [&] {
     progress.show(static_cast<double>(done + failed) / static_cast<double>(table.size()),
@@ -190,6 +194,7 @@ void make_members(const BuildOptions& options, const Workshop& workshop, std::ve
       since_packed = 0;
     }
   }
+  save_table(workshop.state, table);
 }
 
 }  // namespace
