@@ -4,7 +4,7 @@
 #   scripts/experiments/population.sh edge|nano [FOLDER]        FOLDER (default out/population) keeps every step
 #
 # May be stopped and killed at any time; called again it goes on. MINUTES limits how long new people are begun. On two quiet cores `edge` takes about
-# two hours and `nano` one and a half.
+# two hours and `nano` one, by estimate.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"

@@ -8,6 +8,7 @@
 
 #include "ports/linux/files.h"
 #include "toolchain/error.h"
+#include "toolchain/train/csv.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/train/slots.h"
 
@@ -35,19 +36,12 @@ std::vector<Row> find_identities(const std::string& data) {
   return rows;
 }
 
-// Reasons are one line of words of ours and of file names: quotes are doubled, as RFC 4180 asks.
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c == '\n' ? ' ' : c);
-  return out + '"';
-}
-
 void save_table(const std::string& path, const std::vector<Row>& rows) {
   std::string text = "identity,status,iterations,seconds,psnr_db,reason\n";
   for (const Row& row : rows) {
     char numbers[96];
     std::snprintf(numbers, sizeof(numbers), ",%llu,%.1f,%.2f,", static_cast<unsigned long long>(row.iterations), row.seconds, row.psnr_db);
-    text += quoted(row.identity) + "," + row.status + numbers + (row.reason.empty() ? "" : quoted(row.reason)) + "\n";
+    text += train::csv_quoted(row.identity) + "," + row.status + numbers + (row.reason.empty() ? "" : train::csv_quoted(row.reason)) + "\n";
   }
   throw_if_error(ports::write_file_atomically(path, {reinterpret_cast<const std::byte*>(text.data()), text.size()}), "cannot save");
 }

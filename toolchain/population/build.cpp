@@ -15,6 +15,7 @@
 #include "toolchain/error.h"
 #include "toolchain/population/initial_weights.h"
 #include "toolchain/population/member.h"
+#include "toolchain/train/csv.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/pack_population.h"
 #include "toolchain/train/progress.h"
@@ -91,13 +92,6 @@ struct TableRow {
   nlohmann::json row;  // members/ID.json
 };
 
-// Reasons are one line of words of ours and of file names: quotes are doubled, as RFC 4180 asks.
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c == '\n' ? ' ' : c);
-  return out + '"';
-}
-
 // Empty where nothing was held out.
 std::string figure(const nlohmann::json& value, const char* format) {
   char digits[32] = "";
@@ -119,7 +113,7 @@ void save_table(const State& state, const std::vector<TableRow>& table) {
   std::string text = "identity,split,status,train_seconds,capture_cpu_seconds,psnr_view_db,psnr_pose_db,flat_psnr_db,head_psnr_db,reason\n";
   for (const TableRow& row : table) {
     text += row.identity.name() + "," + to_string(row.identity.split) + "," + row.status + figures(row.row) + ",";
-    text += (row.reason.empty() ? "" : quoted(row.reason)) + "\n";
+    text += (row.reason.empty() ? "" : train::csv_quoted(row.reason)) + "\n";
   }
   throw_if_error(ports::write_file_atomically(state.table(), std::as_bytes(std::span(text))), "cannot save");
 }
