@@ -70,13 +70,13 @@ void append(std::vector<T>& to, std::span<const T> values) {
   to.insert(to.end(), values.begin(), values.end());
 }
 
-// Differences of one output channel in integers; returns the scale.
-float quantise_row(std::span<const float> weights, std::span<const float> initial, std::vector<int8_t>& out) {
+// Differences of one output channel in integers, the largest as `levels`; returns the scale.
+float quantise_row(std::span<const float> weights, std::span<const float> initial, uint32_t levels, std::vector<int8_t>& out) {
   float largest = 0;
   for (size_t k = 0; k < weights.size(); ++k) largest = std::max(largest, std::fabs(weights[k] - initial[k]));
-  const float scale = std::max(largest / 127, std::numeric_limits<float>::min());
+  const float most = static_cast<float>(levels), scale = std::max(largest / most, std::numeric_limits<float>::min());
   for (size_t k = 0; k < weights.size(); ++k) {
-    out.push_back(static_cast<int8_t>(clamp_and_round((weights[k] - initial[k]) / scale, -127, 127)));
+    out.push_back(static_cast<int8_t>(clamp_and_round((weights[k] - initial[k]) / scale, -most, most)));
   }
   return scale;
 }
@@ -84,14 +84,16 @@ float quantise_row(std::span<const float> weights, std::span<const float> initia
 // [C] of one member's integers, in the order of the convolutions.
 using Kernels = std::vector<std::vector<int8_t>>;
 
-Kernels quantise(const Avatar& avatar, const Network& initial, std::vector<float>& scales) {
+Kernels quantise(const Avatar& avatar, const Network& initial, uint32_t levels, std::vector<float>& scales) {
   Kernels kernels;
   for (size_t i = 0; i < initial.layers.size(); ++i) {
     if (initial.layers[i].op != LayerOp::kConv2d) continue;
     const std::span<const float> weights = avatar.network.layers[i].weights, start = initial.layers[i].weights;
     const size_t rows = initial.layers[i].out_channels, row = weights.size() / rows;
     std::vector<int8_t>& kernel = kernels.emplace_back();
-    for (size_t o = 0; o < rows; ++o) scales.push_back(quantise_row(weights.subspan(o * row, row), start.subspan(o * row, row), kernel));
+    for (size_t o = 0; o < rows; ++o) {
+      scales.push_back(quantise_row(weights.subspan(o * row, row), start.subspan(o * row, row), levels, kernel));
+    }
   }
   return kernels;
 }
@@ -196,6 +198,9 @@ Status check(const NewPopulation& population) {
   if (population.members.size() > kMaxMembers) {
     return Status(StatusCode::kLimitExceeded, "population: has more than " + std::to_string(kMaxMembers) + " members");
   }
+  if (population.levels < 1 || population.levels > kMostLevels) {
+    return Status(StatusCode::kInvalidArgument, "population: levels " + std::to_string(population.levels) + " are none of 1 to 127");
+  }
   const Result<std::vector<ValueShape>> shapes = infer_shapes(population.initial, true);
   if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, "initial weights: " + shapes.status().message());
   for (const NewMember& member : population.members) FIG_RETURN_IF_ERROR(check_alike(member, population));
@@ -232,7 +237,7 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
     add_factor(avatar.pose_statistics.covariance, 3 * to.pose_joints.size(), storage.pose_factor);
     for (const Layer& layer : avatar.network.layers) append(storage.bias, layer.bias);
     if (from.coding == DifferenceCoding::kInt8) {
-      kernels.push_back(quantise(avatar, from.initial, storage.scale));
+      kernels.push_back(quantise(avatar, from.initial, from.levels, storage.scale));
     } else {
       FIG_RETURN_IF_ERROR(add_halves(member, from.initial, storage.difference));
     }

@@ -195,8 +195,10 @@ TEST(PopulationRoundTrip, MembersKeepWhatIsNotRounded) {
   }
 }
 
-TEST(PopulationRoundTrip, WeightsAreTheStatedArithmetic) {
-  const PopulationSample sample;
+// Members come back as the header states, with so many levels on either side of zero.
+void expect_stated_arithmetic(uint32_t levels) {
+  PopulationSample sample;
+  sample.population.levels = levels;
   const Opened opened = open_or_die(sample.write());
   const Population& population = opened.package.population();
   std::vector<float> storage(member_floats(population));
@@ -211,7 +213,7 @@ TEST(PopulationRoundTrip, WeightsAreTheStatedArithmetic) {
       for (size_t o = 0; o < rows; ++o, ++row) {
         float largest = 0;
         for (size_t k = o * size; k < (o + 1) * size; ++k) largest = std::max(largest, std::fabs(in[k] - initial[k]));
-        const float scale = std::max(largest / 127, std::numeric_limits<float>::min());
+        const float scale = std::max(largest / static_cast<float>(levels), std::numeric_limits<float>::min());
         EXPECT_EQ(scale, population.scale[m * population.scale.size() / 3 + row]);
         for (size_t k = o * size; k < (o + 1) * size; ++k) {
           const float q = std::nearbyint((in[k] - initial[k]) / scale);
@@ -221,8 +223,18 @@ TEST(PopulationRoundTrip, WeightsAreTheStatedArithmetic) {
       }
     }
   }
-  std::printf("  largest error %.4f steps\n", worst);
+  std::printf("  %u levels: largest error %.4f steps\n", levels, worst);
   EXPECT_LE(worst, 0.5 + 1e-3);
+}
+
+TEST(PopulationRoundTrip, WeightsAreTheStatedArithmetic) {
+  for (const uint32_t levels : {127u, 80u, 1u}) expect_stated_arithmetic(levels);
+}
+
+TEST(PopulationWriter, FewerLevelsTakeFewerBytes) {
+  PopulationSample coarse;
+  coarse.population.levels = 32;
+  EXPECT_LT(coarse.write()->size(), PopulationSample().write()->size());
 }
 
 TEST(PopulationRoundTrip, HalvesAreExactWhereTheDifferenceIs) {
@@ -312,6 +324,9 @@ TEST(PopulationWriter, NamesTheMemberThatDiffers) {
     for (Layer& layer : a.network.layers) layer.weights = layer.bias = {};
   });
   expect_refused(bent([](PopulationSample& s) { s.population.members.clear(); }), "has no members", StatusCode::kInvalidArgument);
+  for (const uint32_t levels : {0u, 128u}) {
+    expect_refused(bent([&](PopulationSample& s) { s.population.levels = levels; }), "levels", StatusCode::kInvalidArgument);
+  }
   expect_refused(bent([](PopulationSample& s) { s.population.initial.layers[0].weights = {}; }), "initial weights",
                  StatusCode::kInvalidArgument);
   expect_refused(bent([](PopulationSample& s) { s.avatars[1]->weights[0][0] = 1e6f; }, DifferenceCoding::kHalf), "too large for 16 bits",

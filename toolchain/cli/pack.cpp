@@ -135,6 +135,11 @@ void add_pack_command(CLI::App& app) {
       ->add_option("--init", arguments->population.init,
                    "Weights or run that all members started from (default: the common initial weights)")
       ->needs(population);
+  command
+      ->add_option("--levels", arguments->population.levels,
+                   "Of a population's differences in q8, of either sign (default 127); fewer are smaller and coarser")
+      ->check(CLI::Range(1u, kMostLevels))
+      ->needs(population);
   command->add_option("--split", arguments->population.split, "JSON of the lists train, validation and test (default: all members train)")
       ->needs(population);
   CLI::Option* qat =

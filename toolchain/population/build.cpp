@@ -40,8 +40,8 @@ void keep_recipe(const BuildOptions& options, const State& state) {
   if (!fs::exists(state.recipe())) return train::write_json(state.recipe(), now);
   const nlohmann::json before = train::read_json(state.recipe());
   for (const auto& [key, value] : now.items()) {
-    // What is measured beside does not change the members.
-    if (key != "about" && key != "evaluation" && before.value(key, nlohmann::json()) != value) {
+    // How they are packed and what is measured beside does not change the members.
+    if (key != "about" && key != "package" && key != "evaluation" && before.value(key, nlohmann::json()) != value) {
       throw InputError(options.recipe + ": " + key + ": differs from " + state.recipe() + "; another recipe needs another folder");
     }
   }
@@ -119,8 +119,12 @@ void save_table(const State& state, const std::vector<TableRow>& table) {
 }
 
 void pack(const Recipe& recipe, const State& state) {
-  train::PackPopulationOptions options{
-      .inputs = {state.members()}, .name = recipe.name, .init = recipe.training.init, .split = state.split(), .quiet = true};
+  train::PackPopulationOptions options{.inputs = {state.members()},
+                                       .name = recipe.name,
+                                       .init = recipe.training.init,
+                                       .split = state.split(),
+                                       .levels = recipe.levels,
+                                       .quiet = true};
   throw_if_error(ports::write_file_atomically(state.package(), train::pack_population(options)), "cannot save");
 }
 

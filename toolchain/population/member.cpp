@@ -65,7 +65,8 @@ nlohmann::json rounding_loss(const Workshop& workshop, train::TrainedAvatar& ava
   model::PoseUNet unet(package.avatar().network, {.precision = model::Precision::kFloat32, .seed = train::kInitialWeightsSeed});
   if (!workshop.recipe.training.init.empty()) train::load_weights(workshop.recipe.training.init, unet);
   std::vector<float> storage;
-  NewPopulation alone{.name = "alone", .initial = unet.export_network(storage), .coding = DifferenceCoding::kInt8};
+  NewPopulation alone{
+      .name = "alone", .initial = unet.export_network(storage), .coding = DifferenceCoding::kInt8, .levels = workshop.recipe.levels};
   alone.members.push_back({.avatar = &package.avatar(), .provenance = &package.provenance()});
   const AlignedBytes rounded(value_or_throw(write_population(alone), "member"));
   const Package opened = value_or_throw(Package::open(rounded.bytes(), "member"), "member");

@@ -181,8 +181,8 @@ std::string Identity::name() const {
 Recipe read_recipe(const std::string& path) {
   const nlohmann::json text = train::read_json(path);
   const JsonField json(text, path);
-  allow_only(json,
-             {"about", "name", "body", "preset", "seed", "motions", "capture", "groups", "initial_weights", "training", "evaluation"});
+  allow_only(json, {"about", "name", "body", "preset", "seed", "motions", "capture", "groups", "initial_weights", "training", "package",
+                    "evaluation"});
   Recipe recipe;
   recipe.name = json["name"].text();
   if (json.has("body")) {
@@ -197,6 +197,10 @@ Recipe read_recipe(const std::string& path) {
   for (const JsonField& group : json["groups"].items()) recipe.groups.push_back(read_group(group));
   recipe.initial = read_initial(json["initial_weights"]);
   recipe.training = read_training(json["training"], json["preset"].text());
+  if (json.has("package")) {
+    allow_only(json["package"], {"levels"});
+    recipe.levels = count(json["package"]["levels"], 1, kMostLevels);
+  }
   if (json.has("evaluation")) {
     const JsonField evaluation = json["evaluation"];
     allow_only(evaluation, {"frozen", "scratch", "rounded", "view_frame_step"});

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "figurine/population.h"
+#include "formats/writer/population_writer.h"
 #include "toolchain/capture/rig.h"
 #include "toolchain/capture/wardrobe.h"
 #include "toolchain/train/settings.h"
@@ -49,6 +49,7 @@ struct Recipe {
   std::vector<IdentityGroup> groups;
   InitialWeightsRecipe initial;
   train::TrainSettings training;  // preset included; .init is the place of the initial weights once they are there
+  uint32_t levels = kMostLevels;  // of the package's differences (population_writer.h); the members do not depend on it
   std::vector<uint32_t> frozen;   // identities that are trained a second time with the body pose frozen, for comparison
   std::vector<uint32_t> scratch;  // identities that are trained a second time from the common random weights, for comparison
   std::vector<uint32_t> rounded;  // identities whose loss by the package's rounding is measured

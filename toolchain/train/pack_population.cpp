@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "formats/writer/package_writer.h"
-#include "formats/writer/population_writer.h"
 #include "toolchain/error.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/train/interrupt.h"
@@ -126,8 +125,10 @@ std::vector<std::byte> pack_population(const PackPopulationOptions& options) {
   const std::vector<Source> sources = open_all(options, progress, interrupt);
   const Avatar& first = sources.front().package().avatar();
   std::vector<float> storage;
-  NewPopulation population{
-      .name = options.name, .initial = initial_weights(first.network, options.init, storage), .coding = options.coding};
+  NewPopulation population{.name = options.name,
+                           .initial = initial_weights(first.network, options.init, storage),
+                           .coding = options.coding,
+                           .levels = options.levels};
   for (const Source& source : sources) {
     const Package& package = source.package();
     NewMember& member = population.members.emplace_back(NewMember{.avatar = &package.avatar(), .provenance = &package.provenance()});
@@ -140,6 +141,7 @@ std::vector<std::byte> pack_population(const PackPopulationOptions& options) {
   }
   population.settings = {{"population.command", current_command()},
                          {"population.commit", current_commit()},
+                         {"population.levels", std::to_string(options.levels)},
                          {"population.init", options.init.empty() ? "seed " + std::to_string(kInitialWeightsSeed) : options.init}};
   population.progress = [&](size_t done) {
     progress.show(0.5 + 0.5 * static_cast<double>(done) / static_cast<double>(sources.size()), std::to_string(done) + " members");

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "figurine/population.h"
+#include "formats/writer/population_writer.h"
 
 namespace figurine::train {
 
@@ -20,6 +22,7 @@ struct PackPopulationOptions {
   std::string split;  // {"train": [NAME...], "validation": [...], "test": [...]}, a whole number standing for a name of six digits; empty:
                       // all train
   DifferenceCoding coding = DifferenceCoding::kInt8;
+  uint32_t levels = kMostLevels;  // of int8 (population_writer.h)
   uint32_t threads = 1;
   bool quiet = false;
 };

@@ -70,6 +70,7 @@ TEST(Recipe, RefusesWhatItCannotMeanInOneLine) {
       {[](auto& j) { j["initial_weights"]["first_step"] = 1.5; }, "initial_weights.first_step: out of range"},
       {[](auto& j) { j["training"]["iteration"] = 4; }, "training: iteration: unknown field"},
       {[](auto& j) { j["training"]["precision"] = "f16"; }, "training.precision: 'f16' is neither"},
+      {[](auto& j) { j["package"] = {{"levels", 128}}; }, "levels: must lie in 1 to 127"},
       {[](auto& j) { j["evaluation"]["frozen"] = {77}; }, "frozen: identity 77 is in no group"},
   };
   for (const auto& [damage, words] : cases) {
