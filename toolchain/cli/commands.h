@@ -14,6 +14,7 @@ void add_capture_command(CLI::App& app);
 void add_avatar_command(CLI::App& app);
 void add_pack_command(CLI::App& app);
 void add_population_command(CLI::App& app);
+void add_sampler_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_evaluate_members_command(CLI::App& evaluate);  // below evaluate
 

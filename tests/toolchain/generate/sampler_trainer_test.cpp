@@ -1,0 +1,161 @@
+// The training of a sampler: it learns, it goes on after an interruption with the same bits, it learns from the training part alone.
+#include "toolchain/generate/sampler_trainer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "formats/writer/population_writer.h"
+#include "ports/linux/files.h"
+#include "runtime/test_packages.h"
+#include "toolchain/error.h"
+#include "toolchain/train/interrupt.h"
+#include "toolchain/train/tensor_file.h"
+
+namespace figurine::generate {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Five members train, one validates, one tests; `bend_test` changes the weights of the last.
+void write_people(const std::string& path, bool bend_test = false) {
+  const tests::SyntheticBody body = tests::make_test_body();
+  const tests::SyntheticAvatar initial = tests::make_test_avatar(body, {.seed = 99});
+  std::vector<tests::SyntheticAvatar> avatars;
+  for (size_t m = 0; m < 7; ++m) {
+    const uint64_t seed = m == 6 && bend_test ? 1000 : m;
+    avatars.push_back(
+        tests::make_test_avatar(body, {.shape = {0.1f * static_cast<float>(m), 0.2f}, .seed = seed, .name = "person" + std::to_string(m)}));
+  }
+  NewPopulation population{.name = "people", .initial = initial.package->avatar().network};
+  for (size_t m = 0; m < avatars.size(); ++m) {
+    const Split split = m < 5 ? Split::kTrain : m == 5 ? Split::kValidation : Split::kTest;
+    population.members.push_back({&avatars[m].package->avatar(), &avatars[m].package->provenance(), split});
+  }
+  const auto bytes = write_population(population);
+  ASSERT_TRUE(bytes.ok()) << bytes.status().message();
+  ASSERT_TRUE(ports::write_file_atomically(path, *bytes).ok());
+}
+
+class SamplerTraining : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("sampler_trainer_test_" + std::to_string(getpid()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    write_people(path("people.fgn"));
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  SamplerRequest request(const std::string& run, Variant variant = Variant::kBasis, uint64_t iterations = 60) const {
+    SamplerRequest request{.population = path("people.fgn"), .run = path(run), .settings = {}, .command = "test", .quiet = true};
+    request.settings.space = {.variant = variant, .rank = 8, .chunk = 128};
+    request.settings.shape = {.token_sizes = {}, .d_model = 16, .blocks = 1, .heads = 2, .feed_forward = 32};
+    request.settings.batch = 8, request.settings.schedule.peak = 3e-3, request.settings.schedule.ramp_iterations = 5;
+    request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
+    return request;
+  }
+
+  std::vector<float> weights(const std::string& run) const {
+    std::vector<float> all;
+    for (const auto& [name, tensor] : train::read_tensor_file(path(run) + "/weights.safetensors").tensors) {
+      all.insert(all.end(), tensor.values.begin(), tensor.values.end());
+    }
+    return all;
+  }
+
+  std::string refusal(const SamplerRequest& request) const {
+    try {
+      train_sampler(request);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+
+  fs::path folder_;
+};
+
+// The loss of predicting the mean is 1, the mean square of a member.
+TEST_F(SamplerTraining, LearnsInEveryVariant) {
+  for (const Variant variant : {Variant::kLayer, Variant::kFlat, Variant::kBasis}) {
+    const std::string run = to_string(variant);
+    const SamplerResult result = train_sampler(request(run, variant, 250));
+    std::printf("  %s: loss %.3f, validation %.3f\n", run.c_str(), result.loss, result.validation_loss);
+    EXPECT_LT(result.loss, 0.75) << run;
+    EXPECT_TRUE(std::isfinite(result.validation_loss));
+    for (const char* file : {"run.json", "log.csv", "weights.safetensors", "checkpoint.safetensors"}) {
+      EXPECT_TRUE(fs::exists(path(run) + "/" + file)) << file;
+    }
+  }
+}
+
+TEST_F(SamplerTraining, GoesOnWithTheSameBits) {
+  train_sampler(request("whole"));
+  SamplerRequest cut = request("cut");
+  for (const uint64_t stop : {7u, 31u, 50u}) {
+    cut.stop_after = stop;
+    EXPECT_THROW(train_sampler(cut), train::Interrupted);
+    cut.resume = true;
+  }
+  cut.stop_after = 0;
+  const SamplerResult result = train_sampler(cut);
+  EXPECT_EQ(result.iteration, 60u);
+  EXPECT_EQ(weights("cut"), weights("whole"));
+  EXPECT_TRUE(train_sampler(cut).was_finished);
+  SamplerRequest other = request("other");
+  other.settings.seed = 2;
+  train_sampler(other);
+  EXPECT_NE(weights("other"), weights("whole"));
+}
+
+TEST_F(SamplerTraining, NeverLooksAtTheTestPart) {
+  train_sampler(request("before"));
+  write_people(path("people.fgn"), true);
+  train_sampler(request("after"));
+  EXPECT_EQ(weights("after"), weights("before"));
+}
+
+TEST_F(SamplerTraining, OpensWhatItTrained) {
+  train_sampler(request("run"));
+  const TrainedSampler sampler = TrainedSampler::open(path("run"));
+  EXPECT_EQ(sampler.training.rows(), 5);
+  EXPECT_EQ(static_cast<size_t>(sampler.training.cols()), sampler.space->size());
+  const std::vector<float> kept = weights("run");
+  EXPECT_EQ(static_cast<size_t>(sampler.transformer->weights().numel()), kept.size());
+  write_people(path("people.fgn"), true);
+  EXPECT_THROW(TrainedSampler::open(path("run")), InputError) << "another population";
+}
+
+TEST_F(SamplerTraining, NamesWhatIsWrong) {
+  train_sampler(request("run", Variant::kBasis, 2));
+  EXPECT_NE(refusal(request("run")).find("holds a run already"), std::string::npos);
+  SamplerRequest resume = request("nowhere");
+  resume.resume = true;
+  EXPECT_NE(refusal(resume).find("no run to resume"), std::string::npos);
+  SamplerRequest many = request("many");
+  many.settings.members = 6;
+  EXPECT_NE(refusal(many).find("has 5 training members, 6 were asked for"), std::string::npos);
+  EXPECT_FALSE(fs::exists(path("many"))) << "nothing half-made";
+  SamplerRequest ends = request("ends");
+  ends.settings.clean_snr = 1e-9;
+  EXPECT_NE(refusal(ends), "accepted");
+  SamplerRequest heads = request("heads");
+  heads.settings.shape.heads = 5;
+  EXPECT_NE(refusal(heads).find("d_model"), std::string::npos);
+  write_people(path("people.fgn"), true);
+  SamplerRequest moved = request("run");
+  moved.resume = true;
+  EXPECT_NE(refusal(moved).find("was trained on population"), std::string::npos);
+  std::ofstream(path("run") + "/run.json") << "{}";
+  EXPECT_NE(refusal(moved).find("is no run of figurine-train sampler"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace figurine::generate

@@ -1,0 +1,202 @@
+#include "toolchain/generate/transformer.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "toolchain/error.h"
+
+namespace figurine::generate {
+
+namespace {
+
+constexpr double kSlowest = 1.0 / 20, kFastest = 20;  // radians a unit of lambda
+constexpr double kPositionDeviation = 0.02;
+
+int64_t value_count(const std::vector<int64_t>& shape) { return std::accumulate(shape.begin(), shape.end(), int64_t{1}, std::multiplies<>()); }
+
+// Names and shapes of all parameters, in the order of the flat tensor.
+std::vector<Transformer::Parameter> list_parameters(const TransformerShape& shape) {
+  std::vector<Transformer::Parameter> list;
+  int64_t at = 0;
+  const auto add = [&](const std::string& name, std::vector<int64_t> size) {
+    const int64_t count = value_count(size);
+    list.push_back({name, std::move(size), at});
+    at += count;
+  };
+  const int64_t d = shape.d_model, tokens = static_cast<int64_t>(shape.token_sizes.size());
+  for (int64_t l = 0; l < tokens; ++l) {
+    add("proj." + std::to_string(l) + ".weight", {d, shape.token_sizes[static_cast<size_t>(l)]});
+    add("proj." + std::to_string(l) + ".bias", {d});
+  }
+  add("position", {tokens + 1, d});
+  add("time.in.weight", {d, d}), add("time.in.bias", {d}), add("time.out.weight", {d, d}), add("time.out.bias", {d});
+  for (int64_t b = 0; b < shape.blocks; ++b) {
+    const std::string block = "block." + std::to_string(b);
+    add(block + ".norm_attention.weight", {d}), add(block + ".norm_attention.bias", {d});
+    add(block + ".qkv.weight", {3 * d, d}), add(block + ".qkv.bias", {3 * d});
+    add(block + ".attended.weight", {d, d}), add(block + ".attended.bias", {d});
+    add(block + ".norm_feed_forward.weight", {d}), add(block + ".norm_feed_forward.bias", {d});
+    add(block + ".feed_in.weight", {shape.feed_forward, d}), add(block + ".feed_in.bias", {shape.feed_forward});
+    add(block + ".feed_out.weight", {d, shape.feed_forward}), add(block + ".feed_out.bias", {d});
+  }
+  add("norm.weight", {d}), add("norm.bias", {d});
+  for (int64_t l = 0; l < tokens; ++l) {
+    add("unproj." + std::to_string(l) + ".weight", {shape.token_sizes[static_cast<size_t>(l)], d});
+    add("unproj." + std::to_string(l) + ".bias", {shape.token_sizes[static_cast<size_t>(l)]});
+  }
+  return list;
+}
+
+bool ends_with(const std::string& text, const char* end) { return text.ends_with(end); }
+
+}  // namespace
+
+void check(const TransformerShape& shape) {
+  if (shape.token_sizes.empty()) throw InputError("sampler: token_sizes: there are none");
+  for (const int64_t size : shape.token_sizes) {
+    if (size < 1) throw InputError("sampler: token_sizes: " + std::to_string(size) + " is no length");
+  }
+  const std::pair<const char*, int64_t> sizes[] = {
+      {"d_model", shape.d_model}, {"blocks", shape.blocks}, {"heads", shape.heads}, {"feed_forward", shape.feed_forward}};
+  for (const auto& [name, value] : sizes) {
+    if (value < 1) throw InputError("sampler: " + std::string(name) + ": " + std::to_string(value) + " is not positive");
+  }
+  if (shape.d_model % (2 * shape.heads) != 0) {
+    throw InputError("sampler: d_model: " + std::to_string(shape.d_model) + " is no multiple of twice the " + std::to_string(shape.heads) +
+                     " heads");
+  }
+}
+
+nlohmann::json to_json(const TransformerShape& shape) {
+  return {{"token_sizes", shape.token_sizes},
+          {"d_model", shape.d_model},
+          {"blocks", shape.blocks},
+          {"heads", shape.heads},
+          {"feed_forward", shape.feed_forward}};
+}
+
+TransformerShape shape_from_json(const nlohmann::json& json, const std::string& where) {
+  TransformerShape shape;
+  try {
+    shape.token_sizes = json.at("token_sizes").get<std::vector<int64_t>>();
+    shape.d_model = json.at("d_model").get<int64_t>(), shape.blocks = json.at("blocks").get<int64_t>();
+    shape.heads = json.at("heads").get<int64_t>(), shape.feed_forward = json.at("feed_forward").get<int64_t>();
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(where + ": " + error.what());
+  }
+  check(shape);
+  return shape;
+}
+
+uint64_t parameter_count(const TransformerShape& shape) {
+  const std::vector<Transformer::Parameter> list = list_parameters(shape);
+  return static_cast<uint64_t>(list.back().begin + value_count(list.back().shape));
+}
+
+uint64_t mac_count(const TransformerShape& shape) {
+  const auto d = static_cast<uint64_t>(shape.d_model), tokens = shape.token_sizes.size() + 1;
+  uint64_t values = 0;
+  for (const int64_t size : shape.token_sizes) values += static_cast<uint64_t>(size);
+  const uint64_t token = 4 * d * d + 2 * d * static_cast<uint64_t>(shape.feed_forward) + 2 * tokens * d;
+  return 2 * values * d + 2 * d * d + static_cast<uint64_t>(shape.blocks) * tokens * token;
+}
+
+torch::Tensor embed_lambda(const torch::Tensor& lambda, int64_t width) {
+  const int64_t half = width / 2;
+  const torch::Tensor step = torch::arange(half, torch::kFloat64) / std::max<int64_t>(1, half - 1);
+  const torch::Tensor frequency = kSlowest * torch::exp(step * std::log(kFastest / kSlowest));
+  const torch::Tensor angle = lambda.to(torch::kFloat64).unsqueeze(1) * frequency;
+  return torch::cat({angle.sin(), angle.cos()}, 1).to(torch::kFloat32);
+}
+
+struct Transformer::Impl {
+  TransformerShape shape;
+  std::vector<Parameter> list;
+  torch::Tensor weights, gradients;    // [P]
+  std::vector<torch::Tensor> tensors;  // views of the weights, leaves whose gradients are views of the gradients
+  std::vector<int64_t> splits;
+
+  // A reader of the parameters in the order of the list.
+  struct Reader {
+    const Impl& impl;
+    size_t at;
+    bool bf16;
+    const torch::Tensor& next() { return impl.tensors[at++]; }
+    torch::Tensor linear(const torch::Tensor& x) {
+      const torch::Tensor &weight = next(), &bias = next();
+      if (!bf16) return torch::linear(x, weight, bias);
+      return torch::linear(x.to(torch::kBFloat16), weight.to(torch::kBFloat16)).to(torch::kFloat32) + bias;
+    }
+    torch::Tensor norm(const torch::Tensor& x) {
+      const torch::Tensor &weight = next(), &bias = next();
+      return torch::layer_norm(x, {impl.shape.d_model}, weight, bias);
+    }
+  };
+
+  torch::Tensor attention(Reader& reader, const torch::Tensor& t) const {
+    const int64_t batch = t.size(0), tokens = t.size(1), width = shape.d_model / shape.heads;
+    const auto qkv = reader.linear(t).view({batch, tokens, 3, shape.heads, width}).permute({2, 0, 3, 1, 4}).unbind(0);
+    const torch::Tensor scores = torch::matmul(qkv[0], qkv[1].transpose(-2, -1)) * (1 / std::sqrt(static_cast<double>(width)));
+    const torch::Tensor mixed = torch::matmul(torch::softmax(scores, -1), qkv[2]);
+    return reader.linear(mixed.transpose(1, 2).reshape({batch, tokens, shape.d_model}));
+  }
+
+  torch::Tensor forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16) const {
+    Reader reader{*this, 0, bf16};
+    std::vector<torch::Tensor> tokens{torch::Tensor()};
+    for (const torch::Tensor& part : z.split_with_sizes(splits, 1)) tokens.push_back(reader.linear(part));
+    const torch::Tensor position = reader.next();
+    tokens[0] = reader.linear(embed_lambda(lambda, shape.d_model));
+    tokens[0] = reader.linear(torch::silu(tokens[0]));
+    torch::Tensor t = torch::stack(tokens, 1) + position;
+    for (int64_t b = 0; b < shape.blocks; ++b) {
+      const torch::Tensor normed = reader.norm(t);
+      t = t + attention(reader, normed);
+      const torch::Tensor hidden = reader.linear(reader.norm(t));
+      t = t + reader.linear(torch::gelu(hidden));
+    }
+    t = reader.norm(t);
+    std::vector<torch::Tensor> out;
+    for (size_t l = 0; l < splits.size(); ++l) out.push_back(reader.linear(t.select(1, static_cast<int64_t>(l) + 1)));
+    return torch::cat(out, 1);
+  }
+};
+
+Transformer::Transformer(const TransformerShape& shape, uint64_t seed) : impl_(std::make_unique<Impl>()) {
+  check(shape);
+  Impl& impl = *impl_;
+  impl.shape = shape, impl.list = list_parameters(shape), impl.splits = shape.token_sizes;
+  const auto count = static_cast<int64_t>(generate::parameter_count(shape));
+  impl.weights = torch::zeros({count}), impl.gradients = torch::zeros({count});
+  auto generator = at::make_generator<at::CPUGeneratorImpl>(seed);
+  double bound = 0;  // of the weight before: its bias has the same
+  for (const Parameter& parameter : impl.list) {
+    const int64_t size = value_count(parameter.shape);
+    const auto view = [&](const torch::Tensor& flat) { return flat.narrow(0, parameter.begin, size).view(parameter.shape); };
+    torch::Tensor values = view(impl.weights);
+    if (parameter.name.find("norm") != std::string::npos) {
+      values.fill_(ends_with(parameter.name, "weight") ? 1 : 0);
+    } else if (parameter.name == "position") {
+      values.normal_(0, kPositionDeviation, generator);
+    } else if (!parameter.name.starts_with("unproj")) {
+      if (ends_with(parameter.name, "weight")) bound = 1 / std::sqrt(static_cast<double>(parameter.shape.back()));
+      values.uniform_(-bound, bound, generator);
+    }
+    torch::Tensor leaf = values.detach().requires_grad_();
+    leaf.mutable_grad() = view(impl.gradients);
+    impl.tensors.push_back(leaf);
+  }
+}
+
+Transformer::~Transformer() = default;
+
+torch::Tensor Transformer::forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16) const {
+  return impl_->forward(z, lambda, bf16);
+}
+torch::Tensor& Transformer::weights() { return impl_->weights; }
+torch::Tensor& Transformer::gradients() { return impl_->gradients; }
+const TransformerShape& Transformer::shape() const { return impl_->shape; }
+const std::vector<Transformer::Parameter>& Transformer::parameters() const { return impl_->list; }
+
+}  // namespace figurine::generate
