@@ -68,15 +68,18 @@ void add_sampler_command(CLI::App& app) {
   command->add_option("--batch", settings.batch, "Members an iteration (default 32)")->check(CLI::Range(1, 65536));
   command->add_option("--learning-rate", settings.schedule.peak, "Of AdamW, at its highest (default 2e-4)")->check(CLI::Range(1e-9, 1.0));
   command->add_option("--weight-decay", settings.weight_decay, "Of AdamW (default 0)")->check(CLI::Range(0.0, 10.0));
-  command->add_option("--ema", settings.ema, "Decay of the moving average of the weights (default 0.999)")->check(CLI::Range(0.0, 0.999999));
+  command->add_option("--ema", settings.ema, "Decay of the moving average of the weights (default 0.999)")
+      ->check(CLI::Range(0.0, 0.999999));
   command->add_option("--clean-snr", settings.clean_snr, "Signal-to-noise ratio where sampling ends (default 1e4)")
       ->check(CLI::Range(1.0, 1e12));
-  command->add_option("--noisy-end", settings.noisy_dimension_snr, "Dimension times signal-to-noise ratio where sampling begins (default 0.1)")
+  command
+      ->add_option("--noisy-end", settings.noisy_dimension_snr, "Dimension times signal-to-noise ratio where sampling begins (default 0.1)")
       ->check(CLI::Range(1e-9, 100.0));
   command->add_option("--seed", settings.seed, "Of weights, order and noise (default 1)");
   command->add_flag("--bf16,!--no-bf16", settings.bf16, "Matrix products in bfloat16 (default: float)");
   command->add_option("--threads", settings.threads, "Default: all cores")->check(CLI::Range(1, 256));
-  CLI::Option* iterations = command->add_option("--iterations", arguments->iterations, "Budget (default 10000)")->check(CLI::PositiveNumber);
+  CLI::Option* iterations =
+      command->add_option("--iterations", arguments->iterations, "Budget (default 10000)")->check(CLI::PositiveNumber);
   command->add_option("--minutes", arguments->minutes, "Budget in minutes of training")->check(CLI::PositiveNumber)->excludes(iterations);
   command->add_flag("--resume", request.resume, "Go on from the run's checkpoint, by the run's own settings");
   command->add_flag("--quiet", request.quiet, "No progress, no summary");

@@ -17,9 +17,7 @@ constexpr Variant kVariants[] = {Variant::kLayer, Variant::kFlat, Variant::kBasi
 
 }  // namespace
 
-const char* to_string(Variant variant) {
-  return variant == Variant::kLayer ? "layer" : variant == Variant::kFlat ? "flat" : "basis";
-}
+const char* to_string(Variant variant) { return variant == Variant::kLayer ? "layer" : variant == Variant::kFlat ? "flat" : "basis"; }
 
 Variant variant_from_string(const std::string& name) {
   for (const Variant variant : kVariants) {

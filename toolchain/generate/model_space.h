@@ -21,7 +21,7 @@
 namespace figurine::generate {
 
 enum class Variant : uint8_t { kLayer, kFlat, kBasis };
-const char* to_string(Variant variant);                 // "layer", "flat", "basis"
+const char* to_string(Variant variant);                // "layer", "flat", "basis"
 Variant variant_from_string(const std::string& name);  // throws InputError naming the known ones
 
 struct ModelSpaceOptions {

@@ -16,10 +16,9 @@ const TransformerPreset& find_transformer_preset(const std::string& name) {
 }
 
 NoiseSchedule noise_schedule(const SamplerSettings& settings, size_t dimension) {
-  return value_or_throw(NoiseSchedule::create({.dimension = dimension,
-                                               .noisy_dimension_snr = settings.noisy_dimension_snr,
-                                               .clean_snr = settings.clean_snr}),
-                        "sampler");
+  return value_or_throw(
+      NoiseSchedule::create({.dimension = dimension, .noisy_dimension_snr = settings.noisy_dimension_snr, .clean_snr = settings.clean_snr}),
+      "sampler");
 }
 
 nlohmann::json to_json(const SamplerSettings& settings) {

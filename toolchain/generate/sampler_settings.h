@@ -25,12 +25,12 @@ const TransformerPreset& find_transformer_preset(const std::string& name);  // t
 
 struct SamplerSettings {
   ModelSpaceOptions space;
-  TransformerShape shape;       // token_sizes follow from the space
-  uint32_t members = 0;      // the first so many training members; 0: all
-  double clean_snr = 1e4;    // where sampling ends: 40 dB, below the rounding of int8
+  TransformerShape shape;            // token_sizes follow from the space
+  uint32_t members = 0;              // the first so many training members; 0: all
+  double clean_snr = 1e4;            // where sampling ends: 40 dB, below the rounding of int8
   double noisy_dimension_snr = 0.1;  // D x SNR where it begins (figurine/noise_level.h)
   uint32_t batch = 32;
-  double ema = 0.999;        // decay of the moving average of the weights, which is what is kept
+  double ema = 0.999;  // decay of the moving average of the weights, which is what is kept
   uint64_t seed = 1;
   bool bf16 = false;
   uint32_t threads = 1;

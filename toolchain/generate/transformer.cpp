@@ -13,7 +13,9 @@ namespace {
 constexpr double kSlowest = 1.0 / 20, kFastest = 20;  // radians a unit of lambda
 constexpr double kPositionDeviation = 0.02;
 
-int64_t value_count(const std::vector<int64_t>& shape) { return std::accumulate(shape.begin(), shape.end(), int64_t{1}, std::multiplies<>()); }
+int64_t value_count(const std::vector<int64_t>& shape) {
+  return std::accumulate(shape.begin(), shape.end(), int64_t{1}, std::multiplies<>());
+}
 
 // Names and shapes of all parameters, in the order of the flat tensor.
 std::vector<Transformer::Parameter> list_parameters(const TransformerShape& shape) {

@@ -1,8 +1,8 @@
 // exp, expm1, log, sine and cosine in double, of our own: what places noise levels and draws noise gives the same bits on every CPU.
 //
-// Exactly rounded IEEE operations in a fixed order, as the runtime's float_math.h. Plain power series, cut where the next term is below half
-// a bit: a level or a random number is worth a few more multiplications, and no constant has to be believed. Errors are the largest that
-// double_math_test finds against libm, over dense samples of the stated range.
+// Exactly rounded IEEE operations in a fixed order, as the runtime's float_math.h. Plain power series, cut where the next term is below
+// half a bit: a level or a random number is worth a few more multiplications, and no constant has to be believed. Errors are the largest
+// that double_math_test finds against libm, over dense samples of the stated range.
 #pragma once
 
 #include <bit>
@@ -85,10 +85,14 @@ inline SineCosine sine_cosine_of_turns(double turns) {
   s = a + a * s;
   c = 1.0 + c;
   switch (static_cast<int>(quarter) & 3) {
-    case 0: return {s, c};
-    case 1: return {c, -s};
-    case 2: return {-s, -c};
-    default: return {-c, s};
+    case 0:
+      return {s, c};
+    case 1:
+      return {c, -s};
+    case 2:
+      return {-s, -c};
+    default:
+      return {-c, s};
   }
 }
 

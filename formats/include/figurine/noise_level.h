@@ -26,11 +26,11 @@ NoiseLevel noise_level(double lambda);
 double snr(const NoiseLevel& level);
 
 struct NoiseScheduleOptions {
-  uint64_t dimension = 0;             // D, values of z that vary; at least 1
-  double noisy_dimension_snr = 0.1;   // D x SNR at the noisy end: here z says nothing about which member it came from
+  uint64_t dimension = 0;              // D, values of z that vary; at least 1
+  double noisy_dimension_snr = 0.1;    // D x SNR at the noisy end: here z says nothing about which member it came from
   double decided_dimension_snr = 100;  // D x SNR where the band ends that a member is decided in
-  double clean_snr = 1e4;             // at the clean end: 40 dB, noise below the rounding of an int8 package
-  double band_share = 0.5;            // of the levels within the band, at least
+  double clean_snr = 1e4;              // at the clean end: 40 dB, noise below the rounding of an int8 package
+  double band_share = 0.5;             // of the levels within the band, at least
 };
 
 // A monotone map from u in [0,1] to lambda: 0 is the noisy end, 1 the clean one. Linear in the band and linear beyond it, or linear
@@ -53,7 +53,8 @@ class NoiseSchedule {
 void solver_levels(const NoiseSchedule& schedule, bool pure_noise_start, std::span<NoiseLevel> levels);
 
 // The schedule of HyperDiffusion (Erkoc et al. 2023, after Ho et al. 2020), to compare with: beta linear from 1e-4 to 2e-2 over T =
-// levels.size() - 1 steps, from the noisiest level to no noise at all (lambda = inf). With T = 500 it begins at alpha^2 = 0.0064, not at noise.
+// levels.size() - 1 steps, from the noisiest level to no noise at all (lambda = inf). With T = 500 it begins at alpha^2 = 0.0064, not at
+// noise.
 void linear_beta_levels(std::span<NoiseLevel> levels);
 
 }  // namespace figurine

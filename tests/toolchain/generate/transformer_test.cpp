@@ -23,8 +23,8 @@ TEST(Transformer, CountsItsParameters) {
   EXPECT_EQ(Transformer(kSmall, 1).weights().numel(), static_cast<int64_t>(parameter_count(kSmall)));
 }
 
-// The paper's UNet has 598,011 parameters in 15 layers. Its transformer: 12 blocks of 512 and 2048, of which DESIGN counts 650 million, 94 %
-// of them in the projections.
+// The paper's UNet has 598,011 parameters in 15 layers. Its transformer: 12 blocks of 512 and 2048, of which DESIGN counts 650 million, 94
+// % of them in the projections.
 TEST(Transformer, HasThePapersSize) {
   std::vector<int64_t> tokens(15, 0);
   int64_t left = 598011;
@@ -82,7 +82,8 @@ TEST(Transformer, TellsItsTokensAndTimesApart) {
   EXPECT_GT((a - b).abs().max().item<float>(), 1e-4);
   torch::Tensor other = z.clone();
   other[0][9] += 1;  // of the last token
-  EXPECT_GT((transformer.forward(other, torch::tensor({-2.0})) - a).narrow(1, 0, 5).abs().max().item<float>(), 1e-5) << "attention joins them";
+  EXPECT_GT((transformer.forward(other, torch::tensor({-2.0})) - a).narrow(1, 0, 5).abs().max().item<float>(), 1e-5)
+      << "attention joins them";
 }
 
 TEST(Transformer, Bfloat16IsNearFloat) {
