@@ -32,5 +32,6 @@ std::span<const Case> splat_cases();
 std::span<const Case> pose_cases();
 std::span<const Case> package_cases();
 std::span<const Case> fixed_point_cases();
+std::span<const Case> sampling_cases();
 
 }  // namespace figurine::stability
