@@ -29,7 +29,7 @@ struct NoiseScheduleOptions {
   uint64_t dimension = 0;              // D, values of z that vary; at least 1
   double noisy_dimension_snr = 0.1;    // D x SNR at the noisy end: here z says nothing about which member it came from
   double decided_dimension_snr = 100;  // D x SNR where the band ends that a member is decided in
-  double clean_snr = 1e4;              // at the clean end: 40 dB, noise below the rounding of an int8 package
+  double clean_snr = 1e4;              // at the clean end: 40 dB, about the rounding of int8
   double band_share = 0.5;             // of the levels within the band, at least
 };
 
