@@ -182,6 +182,18 @@ std::string format_hash(const std::array<uint64_t, 2>& hash) {
 
 std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8) { return xxh3_128(std::as_bytes(rgba8)); }
 
+std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape) {
+  std::vector<std::span<const std::byte>> parts;
+  for (const FixedPointConvolution& convolution : fixed.convolutions) {
+    for (const std::span<const std::byte> part :
+         {std::as_bytes(convolution.weights), std::as_bytes(convolution.weight_scale), std::as_bytes(convolution.bias)}) {
+      parts.push_back(part);
+    }
+  }
+  parts.push_back(std::as_bytes(shape));
+  return xxh3_128(parts);
+}
+
 Status check_avatar_fits_body(const Avatar& avatar, const Package& package) {
   const auto mismatch = [&](std::initializer_list<Word> why) {
     return refuse(StatusCode::kMismatch, concatenate({"avatar '", avatar.name, "' does not fit the body"}), why);

@@ -231,10 +231,12 @@ TEST(PopulationRoundTrip, WeightsAreTheStatedArithmetic) {
   for (const uint32_t levels : {127u, 80u, 1u}) expect_stated_arithmetic(levels);
 }
 
+// Of the streams themselves: the file's alignment hides a few bytes of so small a population.
 TEST(PopulationWriter, FewerLevelsTakeFewerBytes) {
   PopulationSample coarse;
   coarse.population.levels = 32;
-  EXPECT_LT(coarse.write()->size(), PopulationSample().write()->size());
+  const Opened few = open_or_die(coarse.write()), many = open_or_die(PopulationSample().write());
+  EXPECT_LT(few.package.population().code.size(), many.package.population().code.size());
 }
 
 TEST(PopulationRoundTrip, HalvesAreExactWhereTheDifferenceIs) {

@@ -121,6 +121,9 @@ class Package {
 std::string format_hash(const std::array<uint64_t, 2>& hash);  // 32 hex digits
 // Of GoldenFrame::fixed_point_hash: XXH3-128 (low, high) of RGBA8 rows without gaps.
 std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8);
+// Of GoldenSeed::hash: XXH3-128 (low, high) of all that an avatar in fixed point is decided by: per convolution its weights, their scales
+// and its biases as they lie in memory, then the shape coefficients.
+std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape);
 
 // An avatar fits a body if the hash, the UV size, the shape count and the golden pose's joint count do. kMismatch names both hashes.
 Status check_avatar_fits_body(const Avatar& avatar, const Package& body);

@@ -10,13 +10,10 @@
 #include <span>
 
 #include "figurine/noise_level.h"
+#include "figurine/sampler.h"
 #include "figurine/status.h"
 
 namespace figurine {
-
-enum class SolverMethod : uint8_t { kDdim, kDpmSolverPlusPlus2M };
-
-inline constexpr size_t kMaxSolverSteps = 1000;
 
 struct SolverOptions {
   SolverMethod method = SolverMethod::kDpmSolverPlusPlus2M;
