@@ -1,8 +1,6 @@
 #include "toolchain/quantize/quantised_network.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "toolchain/error.h"
@@ -11,50 +9,6 @@
 #include "toolchain/quantize/range.h"
 
 namespace figurine::quantize {
-
-namespace {
-
-constexpr float kLargestBias = 0x1p30f;          // steps; leaves half of int32 to the products
-constexpr float kSmallestMultiplier = 0x1p-30f;  // XNNPACK's own limit is 2^-32
-
-bool is_head(const Network& network, size_t layer) { return layer + 1 == network.layers.size(); }
-
-struct Output {  // one output of a convolution
-  std::span<const float> weights;
-  float bias = 0;
-};
-
-Output output_of(const Layer& layer, size_t o) {
-  const size_t per_output = layer.weights.size() / layer.out_channels;
-  return {layer.weights.subspan(o * per_output, per_output), layer.bias[o]};
-}
-
-int8_t quantise_weight(float weight, float scale) {
-  return static_cast<int8_t>(clamp_and_round(weight / scale, -float(kWeightMax), float(kWeightMax)));
-}
-
-// The float expressions of fake quantisation, so that the two agree.
-int32_t quantise_bias(float bias, float input_scale, float weight_scale) {
-  return static_cast<int32_t>(std::nearbyint(std::clamp(bias / (weight_scale * input_scale), -kLargestBias, kLargestBias)));
-}
-
-// Largest magnitude that the output's int32 sum can take.
-double largest_sum(const Output& output, float input_scale, float weight_scale, double input_steps) {
-  double sum = std::abs(double(quantise_bias(output.bias, input_scale, weight_scale)));
-  for (float weight : output.weights) sum += std::abs(int32_t{quantise_weight(weight, weight_scale)}) * input_steps;
-  return sum;
-}
-
-float choose_scale(const Output& output, const Quantisation& input, bool reads_network_input, float output_scale, WeightRange range) {
-  float scale = range == WeightRange::kMaxAbs ? max_abs_scale(output.weights) : smallest_error_scale(output.weights);
-  scale = std::max(scale, kSmallestMultiplier * output_scale / input.scale);
-  scale = std::max(scale, std::abs(output.bias) / (kLargestBias * input.scale));
-  const double steps = reads_network_input ? kInputMax : std::max(kInt8Max - input.zero_point, input.zero_point - kInt8Min);
-  while (largest_sum(output, input.scale, scale, steps) > std::numeric_limits<int32_t>::max()) scale *= 2;
-  return scale;
-}
-
-}  // namespace
 
 std::vector<uint32_t> scale_groups(const Network& network) {
   std::vector<uint32_t> parent(network.layers.size() + 1);
@@ -79,38 +33,15 @@ std::vector<uint32_t> scale_groups(const Network& network) {
 
 std::vector<std::vector<float>> choose_weight_scales(const Network& network, const std::vector<Quantisation>& values, WeightRange range) {
   std::vector<std::vector<float>> scales(network.layers.size());
-  for (size_t i = 0; i < network.layers.size(); ++i) {
-    const Layer& layer = network.layers[i];
-    if (layer.op != LayerOp::kConv2d) continue;
-    const float output_scale = is_head(network, i) ? 1.0f : values[i + 1].scale;
-    for (size_t o = 0; o < layer.out_channels; ++o) {
-      scales[i].push_back(choose_scale(output_of(layer, o), values[layer.inputs[0]], layer.inputs[0] == 0, output_scale, range));
-    }
-  }
+  for_each_output(network, values, [&](size_t layer, size_t, const OutputWeights& output) {
+    const float scale = range == WeightRange::kMaxAbs ? max_abs_scale(output.weights) : smallest_error_scale(output.weights);
+    scales[layer].push_back(raise_weight_scale(scale, output));
+  });
   return scales;
 }
 
-QuantisedNetwork::QuantisedNetwork(const Network& network, const Scales& scales)
-    : scales_(scales), weights_(network.layers.size()), bias_(network.layers.size()) {
-  value_or_throw(infer_shapes(network, true), "fixed point");
-  for (size_t i = 0; i < network.layers.size(); ++i) {
-    const Layer& layer = network.layers[i];
-    if (layer.op != LayerOp::kConv2d) continue;
-    const float input_scale = scales_.values[layer.inputs[0]].scale;
-    for (size_t o = 0; o < layer.out_channels; ++o) {
-      const Output output = output_of(layer, o);
-      const float scale = scales_.weight_scale[i][o];
-      for (float weight : output.weights) weights_[i].push_back(quantise_weight(weight, scale));
-      bias_[i].push_back(quantise_bias(output.bias, input_scale, scale));
-    }
-  }
-  throw_if_error(validate_fixed_point(network, view()), "quantised network");
-}
-
-FixedPointNetwork QuantisedNetwork::view() const {
-  FixedPointNetwork network{.convolutions = {}, .values = scales_.values};
-  for (size_t i = 0; i < weights_.size(); ++i) network.convolutions.push_back({weights_[i], scales_.weight_scale[i], bias_[i]});
-  return network;
+QuantisedNetwork::QuantisedNetwork(const Network& network, const Scales& scales) : values_(scales.values) {
+  throw_if_error(storage_.quantise(network, scales.values, scales.weight_scale), "quantised network");
 }
 
 void imitate(const FixedPointNetwork& fixed, model::PoseUNet& unet) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "figurine/fixed_point.h"
+#include "figurine/fixed_point_weights.h"
 #include "figurine/network.h"
 
 namespace figurine::model {
@@ -38,13 +39,12 @@ class QuantisedNetwork {
   QuantisedNetwork(const Network& network, const Scales& scales);
 
   // Borrows from this object.
-  FixedPointNetwork view() const;
-  const std::vector<Quantisation>& values() const { return scales_.values; }
+  FixedPointNetwork view() const { return storage_.view(); }
+  const std::vector<Quantisation>& values() const { return values_; }
 
  private:
-  Scales scales_;
-  std::vector<std::vector<int8_t>> weights_;
-  std::vector<std::vector<int32_t>> bias_;
+  std::vector<Quantisation> values_;
+  FixedPointStorage storage_;
 };
 
 // Makes the UNet imitate a network in fixed point, a package's for example: its weights become the integers' real values. Throws InputError

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "figurine/check.h"
+#include "figurine/fixed_point_weights.h"
 
 namespace figurine::quantize {
 
@@ -99,12 +100,6 @@ Quantisation quantisation_of(const Range& range) {
   if (!(scale >= std::numeric_limits<float>::min())) return {.scale = 1 / kStepsOfRange, .zero_point = kInt8Min};
   const auto zero_point = static_cast<int32_t>(std::nearbyint(float(kInt8Min) - range.low / scale));
   return {.scale = scale, .zero_point = std::clamp(zero_point, kInt8Min, kInt8Max)};
-}
-
-float max_abs_scale(std::span<const float> weights) {
-  float largest = 0;
-  for (float weight : weights) largest = std::max(largest, std::abs(weight));
-  return largest / float(kWeightMax);
 }
 
 float smallest_error_scale(std::span<const float> weights) {

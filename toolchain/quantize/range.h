@@ -46,8 +46,7 @@ class Histogram {
 // layer) gets a scale as good as any.
 Quantisation quantisation_of(const Range& range);
 
-// max |w| / 127, or the scale below it with the smallest squared error. 0 if all weights are zero.
-float max_abs_scale(std::span<const float> weights);
+// The scale with the smallest squared error, at most max_abs_scale (figurine/fixed_point_weights.h). 0 if all weights are zero.
 float smallest_error_scale(std::span<const float> weights);
 
 }  // namespace figurine::quantize

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "figurine/fixed_point_weights.h"
+
 namespace figurine::quantize {
 namespace {
 
