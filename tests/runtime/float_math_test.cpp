@@ -1,4 +1,4 @@
-// The runtime's own exp, exp2, log2 and logistic against double libm, over dense samples of the floats of their domains.
+// The runtime's own exp, exp2, log2, erf and logistic against double libm, over dense samples of the floats of their domains.
 #include "runtime/src/float_math.h"
 
 #include <gtest/gtest.h>
@@ -44,6 +44,17 @@ TEST(FloatMath, Exp2ErrorIsWithinItsStatement) {
 TEST(FloatMath, Exp2OfANegativePowerNeverExceedsOne) {
   // Blending relies on it: opacity times the weight must not pass the opacity.
   for_each_float(1e-12f, 1.0f, 331, [](float x) { ASSERT_LE(exp2_minus(x), 1.0f) << x; });
+}
+
+TEST(FloatMath, ErfErrorIsWithinItsStatement) {
+  Worst worst;
+  const auto add = [&](float x) { worst.add(erf_float(x) - std::erf(double(x)), x); };
+  for_each_float(-30.0f, -1e-20f, 331, add);
+  for_each_float(1e-20f, 30.0f, 331, add);
+  std::printf("largest error of erf: %.3g at %.9g\n", worst.error, worst.at);
+  EXPECT_LE(worst.error, 6e-7);
+  EXPECT_EQ(erf_float(30.0f), 1.0f);
+  EXPECT_EQ(erf_float(-1e30f), -1.0f);
 }
 
 TEST(FloatMath, ExpErrorIsWithinItsStatement) {

@@ -69,24 +69,32 @@ ActivationStatistics observe_activations(train::TrainedAvatar& avatar, uint32_t 
   ActivationStatistics statistics{.group = scale_groups(network), .histograms = std::vector<Histogram>(network.layers.size() + 1)};
   for (size_t frame : spread_training_frames(avatar.data(), poses)) {
     const train::PosedBody posed = model.pose(model.from_capture(avatar.data().frames()[frame]).view());
-    const std::vector<torch::Tensor> values = model.unet().evaluate_values(posed.input);
-    statistics.input_max = std::max(statistics.input_max, values[0].abs().max().item<float>());
-    for (size_t i = 0; i + 1 < network.layers.size(); ++i) {
-      if (network.layers[i].op == LayerOp::kConv2d) statistics.histograms[statistics.group[i + 1]].add(elements(values[i + 1]));
-    }
-    ++statistics.poses;
+    count_values(network, model.unet().evaluate_values(posed.input), statistics);
   }
   return statistics;
 }
 
-Scales choose_scales(const Network& network, const ActivationStatistics& statistics, const CalibrationOptions& options) {
-  Scales scales;
-  scales.values.resize(network.layers.size());
-  scales.values[0] = {.scale = std::max(kInputHeadroom * statistics.input_max, 1.0f) / float(kInputMax), .zero_point = 0};
+void count_values(const Network& network, const std::vector<torch::Tensor>& values, ActivationStatistics& statistics) {
+  statistics.input_max = std::max(statistics.input_max, values[0].abs().max().item<float>());
+  for (size_t i = 0; i + 1 < network.layers.size(); ++i) {
+    if (network.layers[i].op == LayerOp::kConv2d) statistics.histograms[statistics.group[i + 1]].add(elements(values[i + 1]));
+  }
+  ++statistics.poses;
+}
+
+std::vector<Quantisation> choose_value_scales(const Network& network, const ActivationStatistics& statistics,
+                                              const CalibrationOptions& options) {
+  std::vector<Quantisation> values(network.layers.size());
+  values[0] = {.scale = std::max(kInputHeadroom * statistics.input_max, 1.0f) / float(kInputMax), .zero_point = 0};
   for (size_t value = 1; value < network.layers.size(); ++value) {
     const uint32_t group = statistics.group[value];
-    scales.values[value] = group == value ? quantisation_of(choose_range(statistics.histograms[group], options)) : scales.values[group];
+    values[value] = group == value ? quantisation_of(choose_range(statistics.histograms[group], options)) : values[group];
   }
+  return values;
+}
+
+Scales choose_scales(const Network& network, const ActivationStatistics& statistics, const CalibrationOptions& options) {
+  Scales scales{choose_value_scales(network, statistics, options), {}};
   scales.weight_scale = choose_weight_scales(network, scales.values, options.weights);
   return scales;
 }

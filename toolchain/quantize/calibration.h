@@ -1,6 +1,8 @@
 // Which ranges a trained network's values take on its training poses, and the scales chosen from them. Held-out poses are never looked at.
 #pragma once
 
+#include <torch/torch.h>
+
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -33,6 +35,13 @@ struct ActivationStatistics {
 // Runs the model in float. Only convolutions' outputs are counted: pool, upsample and concatenation add no larger ones. Throws InputError
 // if there is no training pose.
 ActivationStatistics observe_activations(train::TrainedAvatar& avatar, uint32_t poses);
+
+// Counts one evaluation, value 0 first, as PoseUNet::evaluate_values gives it in float. group: as scale_groups of the network has them.
+void count_values(const Network& network, const std::vector<torch::Tensor>& values, ActivationStatistics& statistics);
+
+// The scales of the values alone. network: shapes.
+std::vector<Quantisation> choose_value_scales(const Network& network, const ActivationStatistics& statistics,
+                                              const CalibrationOptions& options);
 
 // network: of the same model, with weights.
 Scales choose_scales(const Network& network, const ActivationStatistics& statistics, const CalibrationOptions& options);

@@ -1,34 +1,11 @@
 #include "runtime/src/nn/integer_convolution.h"
 
 #include <algorithm>
-#include <memory>
 #include <vector>
 
+#include "runtime/src/integer_dot.h"
+
 namespace figurine {
-namespace {
-
-constexpr size_t kOutputsAtOnce = 4;  // sums of one pass over a patch: enough to hide its loads, few enough for 16 registers
-constexpr size_t kVector = 8;         // int16 values that lengths are multiples of
-
-// The scalar specification is what stands here; four sums at once let the compiler load each part of the patch once.
-void multiply_four(const int16_t* __restrict patch, const int16_t* __restrict weights, size_t length, int32_t* __restrict sums) {
-  patch = std::assume_aligned<16>(patch);
-  weights = std::assume_aligned<16>(weights);
-  const int16_t *w0 = weights, *w1 = weights + length, *w2 = w1 + length, *w3 = w2 + length;
-  int32_t s0 = 0, s1 = 0, s2 = 0, s3 = 0;
-  for (size_t k = 0; k < length; ++k) {
-    s0 += int32_t{patch[k]} * w0[k];
-    s1 += int32_t{patch[k]} * w1[k];
-    s2 += int32_t{patch[k]} * w2[k];
-    s3 += int32_t{patch[k]} * w3[k];
-  }
-  sums[0] += s0;
-  sums[1] += s1;
-  sums[2] += s2;
-  sums[3] += s3;
-}
-
-}  // namespace
 
 bool PaddedMap::ensure(uint32_t size, uint32_t channels) {
   size_ = size;
@@ -45,7 +22,7 @@ bool IntegerConvolution::prepare(const Layer& layer, const FixedPointConvolution
   stride_ = PaddedMap::stride_of(varying);
   const size_t taps = size_t{kernel_} * kernel_;
   length_ = taps * stride_;
-  padded_outputs_ = (outputs_ + kOutputsAtOnce - 1) / kOutputsAtOnce * kOutputsAtOnce;
+  padded_outputs_ = (outputs_ + kDotsAtOnce - 1) / kDotsAtOnce * kDotsAtOnce;
   if (!weights_.ensure(padded_outputs_ * length_)) return false;
   for (size_t row = 0; row < outputs_ * taps; ++row) {
     std::copy_n(convolution.weights.data() + row * input.channels, varying, weights_.data() + row * stride_);
@@ -93,7 +70,7 @@ void IntegerConvolution::gather(const PaddedMap& map, uint32_t x, uint32_t y, in
   const size_t row_length = kernel_ * stride_;
   for (int32_t ky = -reach; ky <= reach; ++ky) {
     const int16_t* from = map.row(static_cast<int32_t>(y) + ky) + (ptrdiff_t{x} - reach) * static_cast<ptrdiff_t>(stride_);
-    for (size_t k = 0; k < row_length; k += kVector) std::copy_n(from + k, kVector, patch + k);
+    for (size_t k = 0; k < row_length; k += kDotMultiple) std::copy_n(from + k, kDotMultiple, patch + k);
     patch += row_length;
   }
 }
@@ -115,7 +92,7 @@ void IntegerConvolution::gather(const int8_t* map, int32_t zero_point, uint32_t 
 void IntegerConvolution::sum(const int16_t* patch, uint32_t x, uint32_t y, int32_t* sums) const {
   const int32_t* bias = bias_.data() + (one_bias_ ? 0 : (size_t{y} * size_ + x) * padded_outputs_);
   std::copy_n(bias, padded_outputs_, sums);
-  for (size_t o = 0; o < padded_outputs_; o += kOutputsAtOnce) multiply_four(patch, weights_.data() + o * length_, length_, sums + o);
+  for (size_t o = 0; o < padded_outputs_; o += kDotsAtOnce) add_four_dots(patch, weights_.data() + o * length_, length_, sums + o);
 }
 
 }  // namespace figurine
