@@ -12,7 +12,7 @@ add_custom_target(figurine_schema DEPENDS "${schema_header}")
 
 add_library(figurine_formats STATIC
   src/checksum.cpp src/package.cpp src/package_avatar.cpp src/package_body.cpp src/package_container.cpp src/package_content.cpp src/package_population.cpp
-  src/package_text.cpp src/refusal.cpp)
+  src/package_sampler.cpp src/package_text.cpp src/refusal.cpp)
 add_dependencies(figurine_formats figurine_schema)
 target_link_libraries(figurine_formats PUBLIC figurine_words)
 target_include_directories(figurine_formats PRIVATE "${PROJECT_SOURCE_DIR}")
@@ -20,7 +20,8 @@ target_include_directories(figurine_formats PRIVATE "${PROJECT_SOURCE_DIR}")
 target_include_directories(figurine_formats SYSTEM PRIVATE "${CMAKE_CURRENT_BINARY_DIR}/schema" ${XXHASH_INCLUDE_DIRS})
 target_compile_options(figurine_formats PRIVATE -fno-exceptions)
 
-add_library(figurine_writer STATIC writer/package_assemble.cpp writer/package_parts.cpp writer/package_writer.cpp writer/population_writer.cpp writer/rans_encoder.cpp)
+add_library(figurine_writer STATIC writer/package_assemble.cpp writer/package_parts.cpp writer/package_writer.cpp writer/population_writer.cpp writer/rans_encoder.cpp
+  writer/sampler_writer.cpp)
 add_dependencies(figurine_writer figurine_schema)
 target_link_libraries(figurine_writer PUBLIC figurine_formats)
 target_include_directories(figurine_writer PUBLIC "${PROJECT_SOURCE_DIR}")

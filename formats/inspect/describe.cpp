@@ -232,6 +232,96 @@ Json describe_population(const Package& package) {
           {"members", members}};
 }
 
+// [{op, scale, zero_point}] of every layer's output; the last one's is float.
+Json describe_quantisation(const Network& network, std::span<const Quantisation> values) {
+  Json layers = Json::array();
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    const bool is_head = i + 1 == network.layers.size();
+    layers.push_back({{"op", layer_name(network.layers[i])},
+                      {"scale", is_head ? Json() : Json(number(values[i + 1].scale))},
+                      {"zero_point", is_head ? Json() : Json(values[i + 1].zero_point)}});
+  }
+  return {{"input_scale", number(values[0].scale)}, {"layers", layers}};
+}
+
+Json describe_space(const Sampler& sampler) {
+  const std::vector<size_t> sizes = sampler_token_sizes(sampler);
+  Json tokens = Json::array();
+  const auto add = [&](const std::string& name) {
+    const size_t token = tokens.size();
+    tokens.push_back({{"name", name}, {"values", sizes[token]}, {"rank", sampler.ranks[token]}});
+  };
+  for (size_t i = 0; i < sampler.network.layers.size(); ++i) {
+    if (sampler.network.layers[i].op == LayerOp::kConv2d) add(std::format("layer {}", i));
+  }
+  if (sampler.shape_count > 0) add("shape");
+  return {{"values", sampler.mean.size()},
+          {"directions", sampler.direction_scale.size()},
+          {"bytes", sampler.mean.size_bytes() + sampler.directions.size_bytes() + sampler.direction_scale.size_bytes()},
+          {"tokens", tokens}};
+}
+
+Json describe_denoiser(const Sampler& sampler) {
+  const size_t floats = sampler.bias.size() + sampler.position.size() + sampler.norm.size();
+  return {{"d_model", sampler.denoiser.d_model},
+          {"blocks", sampler.denoiser.blocks},
+          {"heads", sampler.denoiser.heads},
+          {"feed_forward", sampler.denoiser.feed_forward},
+          {"parameters", sampler.matrices.size() + floats},
+          {"bytes", sampler.matrices.size_bytes() + sampler.row_scale.size_bytes() + floats * sizeof(float)}};
+}
+
+Json describe_golden_seeds(const Sampler& sampler) {
+  Json list = Json::array();
+  for (const GoldenSeed& golden : sampler.golden_seeds) {
+    list.push_back(
+        {{"seed", golden.seed}, {"steps", golden.steps}, {"method", to_string(golden.method)}, {"hash", format_hash(golden.hash)}});
+  }
+  return list;
+}
+
+// JSON nests without bound, and whoever walks a document does so on the stack: what is deeper than any report needs stays a text.
+Json describe_report(std::string_view report) {
+  constexpr int kMaxDepth = 32;
+  if (report.empty()) return nullptr;
+  bool too_deep = false;
+  const auto keep = [&](int depth, Json::parse_event_t, Json&) {
+    too_deep |= depth > kMaxDepth;
+    return depth <= kMaxDepth;
+  };
+  Json parsed = Json::parse(report, keep, false);
+  return too_deep || parsed.is_discarded() ? Json(report) : parsed;
+}
+
+Json describe_sampler(const Sampler& sampler) {
+  const NoiseScheduleOptions& noise = sampler.noise;
+  return {{"body", {{"name", sampler.body_name}, {"hash", format_hash(sampler.body_hash)}}},
+          {"preset", sampler.preset},
+          {"template", template_name(sampler.template_mode)},
+          {"shape_coefficients", sampler.shape_count},
+          {"fourier_octaves", sampler.fourier_octaves},
+          {"map_mean", numbers(sampler.map_statistics.mean)},
+          {"map_scale", numbers(sampler.map_statistics.scale)},
+          {"decoding", describe_decoding(sampler.decoding)},
+          {"network", describe_network(sampler.network)},
+          {"quantisation", describe_quantisation(sampler.network, sampler.values)},
+          {"pose_statistics_joints", sampler.pose_statistics.joints},
+          {"golden", describe_golden(sampler.golden)},
+          {"space", describe_space(sampler)},
+          {"denoiser", describe_denoiser(sampler)},
+          {"noise",
+           {{"dimension", noise.dimension},
+            {"noisy_dimension_snr", noise.noisy_dimension_snr},
+            {"decided_dimension_snr", noise.decided_dimension_snr},
+            {"clean_snr", noise.clean_snr},
+            {"band_share", noise.band_share}}},
+          {"steps", sampler.steps},
+          {"method", to_string(sampler.method)},
+          {"golden_seeds", describe_golden_seeds(sampler)},
+          {"population_hash", format_hash(sampler.population_hash)},
+          {"report", describe_report(sampler.report)}};
+}
+
 }  // namespace
 
 Json describe(const Package& package, const std::string& path) {
@@ -265,6 +355,10 @@ Json describe(const Package& package, const std::string& path) {
     case PackageKind::kPopulation:
       document["name"] = package.population().name;
       document["population"] = describe_population(package);
+      break;
+    case PackageKind::kSampler:
+      document["name"] = package.sampler().name;
+      document["sampler"] = describe_sampler(package.sampler());
       break;
   }
   document["provenance"] = describe_provenance(package.provenance());

@@ -64,6 +64,7 @@ Status inspect(const Options& options) {
     if (options.tensors) {
       print("\n" + figurine::inspect::print_tensors(document["tensors"]));
       if (document.contains("avatar")) print(figurine::inspect::print_quantisation(document["avatar"]["fixed_point"]));
+      if (document.contains("sampler")) print(figurine::inspect::print_quantisation(document["sampler"]["quantisation"]));
     }
   }
   return {};

@@ -99,6 +99,16 @@ void print_network(Page& page, const Json& network) {
                                    in_millions(network["macs"])));
 }
 
+void print_decoding(Page& page, const Json& decoding) {
+  page.line("decoding", std::format("offset x {} m, scale x {} texel spacings, log-scale at most {}, opacity bias {}, SH degree {}",
+                                    text_of(decoding["offset_scale_m"]), text_of(decoding["spacing_scale"]),
+                                    text_of(decoding["max_log_scale"]), text_of(decoding["opacity_bias"]), text_of(decoding["sh_degree"])));
+}
+
+void print_pose_statistics(Page& page, const Json& joints) {
+  page.line("pose statistics", joints.empty() ? "none" : std::to_string(joints.size()) + " joints");
+}
+
 void print_avatar(Page& page, const Json& avatar) {
   page.heading("avatar");
   page.line("body", text_of(avatar["body"]["name"]) + "  " + text_of(avatar["body"]["hash"]));
@@ -112,12 +122,8 @@ void print_avatar(Page& page, const Json& avatar) {
                                          fixed["input_scale"].get<double>()));
   }
   page.line("Fourier octaves", text_of(avatar["fourier_octaves"]));
-  const Json& decoding = avatar["decoding"];
-  page.line("decoding", std::format("offset x {} m, scale x {} texel spacings, log-scale at most {}, opacity bias {}, SH degree {}",
-                                    text_of(decoding["offset_scale_m"]), text_of(decoding["spacing_scale"]),
-                                    text_of(decoding["max_log_scale"]), text_of(decoding["opacity_bias"]), text_of(decoding["sh_degree"])));
-  page.line("pose statistics",
-            avatar["pose_statistics_joints"].empty() ? "none" : std::to_string(avatar["pose_statistics_joints"].size()) + " joints");
+  print_decoding(page, avatar["decoding"]);
+  print_pose_statistics(page, avatar["pose_statistics_joints"]);
   const Json& golden = avatar["golden"];
   if (golden.is_null()) {
     page.line("golden frame", "none");
@@ -147,6 +153,72 @@ void print_population(Page& page, const Json& population) {
   }
   page.line("members", std::format("{}: {}", members.size(), splits));
   page.line("differences", population["coding"] == "q8" ? "int8, one scale an output channel, entropy-coded" : "16-bit floats");
+}
+
+void print_sampler(Page& page, const Json& sampler) {
+  page.heading("sampler");
+  page.line("body", text_of(sampler["body"]["name"]) + "  " + text_of(sampler["body"]["hash"]));
+  page.line("joint order", "the body's");
+  page.line("preset", text_of(sampler["preset"]));
+  page.line("template", std::format("{}, {} shape coefficients", text_of(sampler["template"]), text_of(sampler["shape_coefficients"])));
+  print_network(page, sampler["network"]);
+  page.line("Fourier octaves", text_of(sampler["fourier_octaves"]));
+  print_decoding(page, sampler["decoding"]);
+  print_pose_statistics(page, sampler["pose_statistics_joints"]);
+  const Json& golden = sampler["golden"];
+  page.line("golden frame", golden.is_null() ? "none"
+                                             : std::format("{}x{} pixels, {} joints", text_of(golden["width_px"]),
+                                                           text_of(golden["height_px"]), text_of(golden["joints"])));
+
+  page.heading("sampling");
+  const Json &space = sampler["space"], &denoiser = sampler["denoiser"], &noise = sampler["noise"];
+  page.line("weights", std::format("{} values on {} directions, {} tokens, {}", text_of(space["values"]), text_of(space["directions"]),
+                                   space["tokens"].size(), in_bytes(space["bytes"])));
+  page.line("denoiser", std::format("d_model {}, {} blocks, {} heads, feed-forward {}, {} parameters, {}", text_of(denoiser["d_model"]),
+                                    text_of(denoiser["blocks"]), text_of(denoiser["heads"]), text_of(denoiser["feed_forward"]),
+                                    text_of(denoiser["parameters"]), in_bytes(denoiser["bytes"])));
+  page.line("noise", std::format("dimension {0}: {0} x SNR {1} at the noisy end, {2} where the band ends, SNR {3} at the clean end\n"
+                                 "{4} of the levels in the band, at least",
+                                 text_of(noise["dimension"]), text_of(noise["noisy_dimension_snr"]),
+                                 text_of(noise["decided_dimension_snr"]), text_of(noise["clean_snr"]), text_of(noise["band_share"])));
+  page.line("solver", std::format("{} steps of {}", text_of(sampler["steps"]), text_of(sampler["method"])));
+  std::string seeds;
+  for (const Json& seed : sampler["golden_seeds"]) {
+    seeds += std::format("{}{}, {} steps of {}: {}", seeds.empty() ? "" : "\n", text_of(seed["seed"]), text_of(seed["steps"]),
+                         text_of(seed["method"]), text_of(seed["hash"]));
+  }
+  page.line("golden seeds", seeds.empty() ? "none" : seeds);
+  page.line("learnt from", "population " + text_of(sampler["population_hash"]));
+}
+
+std::string print_tokens(const Json& space) {
+  std::string text = std::format("\n{:>6}  {:<12}{:>9}{:>9}\n", "token", "of", "values", "rank");
+  size_t number = 0;
+  for (const Json& token : space["tokens"]) {
+    text += std::format("{:>6}  {:<12}{:>9}{:>9}\n", number++, text_of(token["name"]), text_of(token["values"]), text_of(token["rank"]));
+  }
+  return text;
+}
+
+// The first figures of the evaluation. Its names and texts were checked for control characters as they lie in the file, not behind JSON's
+// escapes: printed escaped.
+std::string print_report(const Json& report) {
+  constexpr size_t kMostLines = 40, kMostBytes = 100;
+  if (report.is_null()) return "";
+  const auto shortened = [](const std::string& text) { return text.size() <= kMostBytes ? text : text.substr(0, kMostBytes) + "..."; };
+  std::vector<std::pair<std::string, std::string>> lines;
+  const Json leaves = report.flatten();
+  for (const auto& [pointer, value] : leaves.items()) {
+    const std::string name = Json(pointer).dump(-1, ' ', true);
+    lines.emplace_back(shortened(name.substr(1, name.size() - 2)), shortened(value.dump(-1, ' ', true)));
+  }
+  const size_t shown = std::min(lines.size(), kMostLines);
+  size_t width = 0;
+  for (size_t i = 0; i < shown; ++i) width = std::max(width, lines[i].first.size() + 2);
+  std::string text = "\nevaluation\n";
+  for (size_t i = 0; i < shown; ++i) text += std::format("  {:<{}}{}\n", lines[i].first, width, lines[i].second);
+  if (lines.size() > shown) text += std::format("  and {} more (--json)\n", lines.size() - shown);
+  return text;
 }
 
 // The table's columns of quality: the first few figures, whatever they are called.
@@ -212,7 +284,7 @@ std::string print_package(const Json& document) {
 
   page.heading("what it needs");
   const Json& budget = document["budget"];
-  if (document["kind"] == "avatar" || document["kind"] == "population") {
+  if (document["kind"] == "avatar" || document["kind"] == "population" || document["kind"] == "sampler") {
     page.line("peak memory", in_bytes(budget["peak_memory_bytes"]));
     page.line("MACs a frame", in_millions(budget["macs_per_frame"]));
   }
@@ -226,8 +298,12 @@ std::string print_package(const Json& document) {
   if (document.contains("avatar")) print_avatar(page, document["avatar"]);
   if (document.contains("motion")) print_motion(page, document["motion"]);
   if (document.contains("population")) print_population(page, document["population"]);
+  if (document.contains("sampler")) print_sampler(page, document["sampler"]);
   print_provenance(page, document["provenance"], document.contains("population"));
-  return page.text() + (document.contains("population") ? print_members(document["population"]) : "");
+  if (document.contains("population")) return page.text() + print_members(document["population"]);
+  if (document.contains("sampler"))
+    return page.text() + print_tokens(document["sampler"]["space"]) + print_report(document["sampler"]["report"]);
+  return page.text();
 }
 
 std::string print_tensors(const Json& tensors) {
@@ -258,7 +334,7 @@ std::string print_quantisation(const Json& fixed_point) {
     const Json weights = layer.value("weight_scale", Json{{"min", nullptr}, {"max", nullptr}});
     const bool is_head = layer["scale"].is_null();
     text += row(i++, text_of(layer["op"]), is_head ? "float" : six(layer["scale"]), is_head ? "" : text_of(layer["zero_point"]),
-                six(weights["min"]), six(weights["max"]), text_of(layer["bytes"]));
+                six(weights["min"]), six(weights["max"]), layer.contains("bytes") ? text_of(layer["bytes"]) : "");
   }
   return text;
 }

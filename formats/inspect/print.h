@@ -9,7 +9,7 @@ namespace figurine::inspect {
 
 std::string print_package(const Json& document);
 std::string print_tensors(const Json& tensors);
-// The quantisation of every layer's output; empty for null.
+// The quantisation of every layer's output, and of its weights where they are; empty for null.
 std::string print_quantisation(const Json& fixed_point);
 std::string print_comparison(const Json& comparison);
 

@@ -137,15 +137,13 @@ void concatenate(const Map& a, const Map& b, std::vector<int8_t>& out) {
 
 }  // namespace
 
-Status validate_fixed_point(const Network& network, const FixedPointNetwork& fixed) {
+Status validate_quantisation(const Network& network, std::span<const Quantisation> values) {
   const Result<std::vector<ValueShape>> shapes = infer_shapes(network, false);
   if (!shapes.ok()) return shapes.status();
   const size_t count = network.layers.size();
-  if (fixed.convolutions.size() != count || fixed.values.size() != count) {
-    return Status(StatusCode::kCorrupt, "fixed point: not one entry per layer");
-  }
+  if (values.size() != count) return Status(StatusCode::kCorrupt, "fixed point: not one entry per layer");
   for (size_t value = 0; value < count; ++value) {
-    const auto& [scale, zero_point] = fixed.values[value];
+    const auto& [scale, zero_point] = values[value];
     const std::string name = "fixed point: value " + std::to_string(value) + ": ";
     if (!is_scale(scale)) return Status(StatusCode::kCorrupt, name + "the scale is not finite and positive");
     if (zero_point < kInt8Min || zero_point > kInt8Max || (value == 0 && zero_point != 0)) {
@@ -157,15 +155,24 @@ Status validate_fixed_point(const Network& network, const FixedPointNetwork& fix
   }
   for (size_t i = 0; i < count; ++i) {
     const Layer& layer = network.layers[i];
-    if (layer.op == LayerOp::kConv2d) {
-      FIG_RETURN_IF_ERROR(validate_convolution(network, fixed, i, (*shapes)[layer.inputs[0]]));
-      continue;
-    }
+    if (layer.op == LayerOp::kConv2d) continue;
     const bool two = layer.op == LayerOp::kConcat;
     if (layer.inputs[0] == 0 || (two && layer.inputs[1] == 0)) return corrupt(i, "reads the int16 input; only convolutions can");
-    if (fixed.values[layer.inputs[0]] != fixed.values[i + 1] || (two && fixed.values[layer.inputs[1]] != fixed.values[i + 1])) {
+    if (values[layer.inputs[0]] != values[i + 1] || (two && values[layer.inputs[1]] != values[i + 1])) {
       return corrupt(i, "inputs and output do not share one quantisation");
     }
+  }
+  return {};
+}
+
+Status validate_fixed_point(const Network& network, const FixedPointNetwork& fixed) {
+  FIG_RETURN_IF_ERROR(validate_quantisation(network, fixed.values));
+  const size_t count = network.layers.size();
+  if (fixed.convolutions.size() != count) return Status(StatusCode::kCorrupt, "fixed point: not one entry per layer");
+  const std::vector<ValueShape> shapes = *infer_shapes(network, false);
+  for (size_t i = 0; i < count; ++i) {
+    const Layer& layer = network.layers[i];
+    if (layer.op == LayerOp::kConv2d) FIG_RETURN_IF_ERROR(validate_convolution(network, fixed, i, shapes[layer.inputs[0]]));
   }
   return {};
 }

@@ -18,6 +18,8 @@ const char* to_string(PackageKind kind) {
       return "motion";
     case PackageKind::kPopulation:
       return "population";
+    case PackageKind::kSampler:
+      return "sampler";
   }
   return "unknown";
 }
@@ -63,7 +65,7 @@ size_t size_bytes(DataType type) {
 struct Package::Contents {
   layout::Header header;
   std::array<uint64_t, 2> content_hash{0, 0};
-  std::variant<Body, Avatar, Motion, PopulationContent> content;
+  std::variant<Body, Avatar, Motion, PopulationContent, Sampler> content;
   Budget budget;
   Provenance provenance;
   std::vector<TensorInfo> tensors;
@@ -115,6 +117,9 @@ Result<Package> Package::open(std::span<const std::byte> bytes, const std::strin
       case PackageKind::kPopulation:
         FIG_RETURN_IF_ERROR(read_population(index, blobs, contents->budget, contents->content.emplace<PopulationContent>()));
         break;
+      case PackageKind::kSampler:
+        FIG_RETURN_IF_ERROR(read_sampler(index, blobs, contents->budget, contents->content.emplace<Sampler>()));
+        break;
     }
     FIG_RETURN_IF_ERROR(check_features(contents->header, std::get_if<Avatar>(&contents->content)));
     return blobs.check_all_known();
@@ -152,6 +157,11 @@ const Motion& Package::motion() const {
 const Population& Package::population() const {
   FIG_CHECK(kind() == PackageKind::kPopulation, "the package is not a population");
   return std::get_if<PopulationContent>(&contents_->content)->population;
+}
+
+const Sampler& Package::sampler() const {
+  FIG_CHECK(kind() == PackageKind::kSampler, "the package is not a sampler");
+  return *std::get_if<Sampler>(&contents_->content);
 }
 
 Provenance Package::member_provenance(size_t member) const {

@@ -10,30 +10,30 @@
 
 namespace figurine {
 
-Status read_map_statistics(const schema::MapStatistics& table, MapStatistics& out) {
+Status read_map_statistics(const schema::MapStatistics& table, std::string_view owner, MapStatistics& out) {
+  const std::string field = concatenate({owner, ".map_statistics"});
   for (uint32_t c = 0; c < kMapChannels; ++c) {
     out.mean[c] = table.mean()->Get(c);
     out.scale[c] = table.scale()->Get(c);
-    if (!(std::fabs(out.mean[c]) <= layout::kMaxLengthM))
-      return corrupt("avatar.map_statistics", "channel ", c, ": the mean is not finite or too large");
-    if (!(out.scale[c] > 0 && out.scale[c] <= 1e6f))
-      return corrupt("avatar.map_statistics", "channel ", c, ": the scale is not positive, or too large");
+    if (!(std::fabs(out.mean[c]) <= layout::kMaxLengthM)) return corrupt(field, "channel ", c, ": the mean is not finite or too large");
+    if (!(out.scale[c] > 0 && out.scale[c] <= 1e6f)) return corrupt(field, "channel ", c, ": the scale is not positive, or too large");
   }
   return {};
 }
 
-Status read_decoding(const schema::HeadDecoding& table, HeadDecoding& out) {
+Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, HeadDecoding& out) {
   out = {.offset_scale_m = table.offset_scale_m(),
          .spacing_scale = table.spacing_scale(),
          .max_log_scale = table.max_log_scale(),
          .opacity_bias = table.opacity_bias(),
          .sh_degree = table.sh_degree()};
   const auto within = [](float value, float max) { return value > 0 && value <= max; };
-  if (!within(out.offset_scale_m, 10)) return corrupt("avatar.decoding.offset_scale_m", "is not above 0 and at most 10");
-  if (!within(out.spacing_scale, 100)) return corrupt("avatar.decoding.spacing_scale", "is not above 0 and at most 100");
-  if (!within(out.max_log_scale, 20)) return corrupt("avatar.decoding.max_log_scale", "is not above 0 and at most 20");
-  if (!(std::fabs(out.opacity_bias) <= 100)) return corrupt("avatar.decoding.opacity_bias", "is not within -100 and 100");
-  if (out.sh_degree > kMaxShDegree) return corrupt("avatar.decoding.sh_degree", "is above ", kMaxShDegree);
+  const std::string field = concatenate({owner, ".decoding."});
+  if (!within(out.offset_scale_m, 10)) return corrupt(field + "offset_scale_m", "is not above 0 and at most 10");
+  if (!within(out.spacing_scale, 100)) return corrupt(field + "spacing_scale", "is not above 0 and at most 100");
+  if (!within(out.max_log_scale, 20)) return corrupt(field + "max_log_scale", "is not above 0 and at most 20");
+  if (!(std::fabs(out.opacity_bias) <= 100)) return corrupt(field + "opacity_bias", "is not within -100 and 100");
+  if (out.sh_degree > kMaxShDegree) return corrupt(field + "sh_degree", "is above ", kMaxShDegree);
   return {};
 }
 
@@ -118,13 +118,13 @@ Status read_network(const schema::Avatar& table, BlobReader& blobs, Avatar& out)
 
 }  // namespace
 
-Status check_network_fits(const Avatar& avatar, const Budget& budget) {
+Status check_network_fits(const Avatar& avatar, std::string_view owner, const Budget& budget) {
   const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, false);
   if (avatar.network.input_size > kMaxUvSize) {
     return over_limit("network.input_size", "is larger than ", kMaxUvSize);
   }
   if (avatar.fourier_octaves > layout::kMaxFourierOctaves) {
-    return over_limit("avatar.fourier_octaves", "is above ", layout::kMaxFourierOctaves);
+    return over_limit(concatenate({owner, ".fourier_octaves"}), "is above ", layout::kMaxFourierOctaves);
   }
   if (const uint32_t channels = kMapChannels + 4 * avatar.fourier_octaves; avatar.network.input_channels != channels) {
     return corrupt("network.input_channels", "is ", avatar.network.input_channels, ", maps and Fourier channels make ", channels);
@@ -190,16 +190,16 @@ Status check_covariance(std::span<const float> covariance, size_t n, const std::
   return is_positive_definite(covariance, n) ? Status() : corrupt(field, "is not positive definite");
 }
 
-namespace {
-
-Status read_pose_statistics(const schema::PoseStatistics& table, BlobReader& blobs, PoseStatistics& out) {
-  FIG_RETURN_IF_ERROR(read_statistics_joints(*table.joints(), "avatar.pose_statistics.joints", out.joints));
+Status read_pose_statistics(const schema::PoseStatistics& table, std::string_view owner, BlobReader& blobs, PoseStatistics& out) {
+  FIG_RETURN_IF_ERROR(read_statistics_joints(*table.joints(), concatenate({owner, ".pose_statistics.joints"}), out.joints));
   const uint32_t n = static_cast<uint32_t>(out.joints.size()) * 3;
   FIG_RETURN_IF_ERROR(blobs.read("pose.mean", {n}, out.mean));
   FIG_RETURN_IF_ERROR(blobs.read("pose.covariance", {n, n}, out.covariance));
   FIG_RETURN_IF_ERROR(check_magnitude(out.mean, "pose.mean", 100));
   return check_covariance(out.covariance, n, "pose.covariance");
 }
+
+namespace {
 
 // The image's size stands in the first chunk of every PNG.
 Status check_png(std::span<const uint8_t> png, const Camera& camera) {
@@ -242,8 +242,6 @@ Status check_golden_pose(const GoldenFrame& golden) {
   return status.ok() ? Status() : corrupt("golden", status.message());
 }
 
-namespace {
-
 Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFrame& out) {
   FIG_RETURN_IF_ERROR(read_golden_view(table, out));
   FIG_RETURN_IF_ERROR(blobs.read("golden.rotations", {BlobReader::kAny, 4}, out.rotations));
@@ -256,8 +254,6 @@ Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFr
   FIG_RETURN_IF_ERROR(blobs.read("golden.png", {BlobReader::kAny}, out.png, BlobReader::kMayBeAbsent));
   return out.png.empty() ? Status() : check_png(out.png, out.camera);
 }
-
-}  // namespace
 
 Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& budget, Avatar& out) {
   const schema::Avatar& table = *index.content_as_Avatar();
@@ -272,12 +268,14 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
     return over_limit("avatar.shape", "has more than ", kMaxShapeCoefficients, " coefficients");
   }
   FIG_RETURN_IF_ERROR(check_magnitude(out.shape, "avatar.shape", 1000));
-  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), out.map_statistics));
+  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), "avatar", out.map_statistics));
   out.fourier_octaves = table.fourier_octaves();
-  FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), out.decoding));
+  FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), "avatar", out.decoding));
   FIG_RETURN_IF_ERROR(read_network(table, blobs, out));
-  FIG_RETURN_IF_ERROR(check_network_fits(out, budget));
-  if (table.pose_statistics() != nullptr) FIG_RETURN_IF_ERROR(read_pose_statistics(*table.pose_statistics(), blobs, out.pose_statistics));
+  FIG_RETURN_IF_ERROR(check_network_fits(out, "avatar", budget));
+  if (table.pose_statistics() != nullptr) {
+    FIG_RETURN_IF_ERROR(read_pose_statistics(*table.pose_statistics(), "avatar", blobs, out.pose_statistics));
+  }
   if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden(*table.golden(), blobs, out.golden));
   if (out.fixed_point.empty() && out.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
     return corrupt("golden.fixed_point_hash", "is there, a network in fixed point is not");

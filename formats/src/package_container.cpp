@@ -22,8 +22,9 @@ Status check_header(const Header& header, uint64_t actual_bytes, std::span<const
   if (const uint64_t unknown = header.required_features & ~layout::kKnownRequiredFeatures; unknown != 0) {
     return unsupported("header.required_features", "needs features that this build does not know, as a bit field: ", unknown);
   }
-  if (header.kind < uint32_t(PackageKind::kBody) || header.kind > uint32_t(PackageKind::kPopulation)) {
-    return unsupported("header.kind", "is ", header.kind, ", this build knows 1 (body), 2 (avatar), 3 (motion), 4 (population)");
+  if (header.kind < uint32_t(PackageKind::kBody) || header.kind > uint32_t(PackageKind::kSampler)) {
+    return unsupported("header.kind", "is ", header.kind,
+                       ", this build knows 1 (body), 2 (avatar), 3 (motion), 4 (population), 5 (sampler)");
   }
   if (header.file_bytes != actual_bytes) {
     return corrupt("header.file_bytes", "the file has ", actual_bytes, " bytes, its header says ", header.file_bytes);

@@ -52,5 +52,9 @@ inline constexpr uint64_t kMaxValueBytes = 1u << 30;  // of one activation of a 
 inline constexpr float kMaxLengthM = 1000;            // of a body; catches files in other units before they become infinities
 inline constexpr float kMaxTranslationM = 1e6f;       // of a motion's root
 inline constexpr float kMaxFramesPerSecond = 10000;
+inline constexpr uint32_t kMaxReportBytes = 256u << 10;  // of a sampler's evaluation
+// Of the floats of a sampler: no matrix's result and no sampled weight then leaves the range of a float. The largest are 4096 products of
+// 4096 products of normalised values: (1e6 * 127 * 4096)^2 * 65e6 = 2e31 of 3e38.
+inline constexpr float kMaxSamplerValue = 1e6f;
 
 }  // namespace figurine::layout

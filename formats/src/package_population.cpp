@@ -59,8 +59,8 @@ Status read_member_table(const schema::Member& table, size_t quality_count, Popu
   if (out.name.find('#') != std::string::npos) return corrupt("name", "has a '#' in it, which stands between a package and a member");
   if (table.split() > schema::Split::MAX) return unsupported("split", "is unknown");
   out.split = static_cast<Split>(table.split());
-  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), out.map_statistics));
-  FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), out.decoding));
+  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), "avatar", out.map_statistics));
+  FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), "avatar", out.decoding));
   if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden_view(*table.golden(), out.golden));
   if (const auto* quality = table.quality(); quality != nullptr) out.quality.assign(quality->begin(), quality->end());
   if (out.quality.size() != quality_count) return corrupt("quality", "has ", out.quality.size(), " figures for ", quality_count, " names");
@@ -185,7 +185,7 @@ Status check_members_fit(const Population& population, const Budget& budget) {
   for (size_t m = 0; m < population.size(); ++m) {
     const Avatar avatar{
         .fourier_octaves = population.fourier_octaves, .decoding = population.members[m].decoding, .network = population.network};
-    FIG_RETURN_IF_ERROR(check_network_fits(avatar, budget).within(concatenate({"population.members[", m, "]"})));
+    FIG_RETURN_IF_ERROR(check_network_fits(avatar, "avatar", budget).within(concatenate({"population.members[", m, "]"})));
   }
   return {};
 }

@@ -60,11 +60,15 @@ Offset<schema::GoldenFrame> build_golden(FlatBufferBuilder& b, const GoldenFrame
   return schema::CreateGoldenFrame(b, &translation, &camera, &background, golden.fixed_point_hash[0], golden.fixed_point_hash[1], library);
 }
 
+Offset<flatbuffers::Vector<const schema::Quantisation*>> build_quantisation(FlatBufferBuilder& b, const std::vector<Quantisation>& values) {
+  std::vector<schema::Quantisation> structs;
+  for (const Quantisation& value : values) structs.emplace_back(value.scale, value.zero_point);
+  return b.CreateVectorOfStructs(structs);
+}
+
 Offset<schema::FixedPoint> build_fixed_point(FlatBufferBuilder& b, const FixedPointNetwork& fixed) {
   if (fixed.empty()) return 0;
-  std::vector<schema::Quantisation> values;
-  for (const Quantisation& value : fixed.values) values.emplace_back(value.scale, value.zero_point);
-  return schema::CreateFixedPoint(b, b.CreateVectorOfStructs(values));
+  return schema::CreateFixedPoint(b, build_quantisation(b, fixed.values));
 }
 
 schema::MapStatistics build_map_statistics(const MapStatistics& statistics) {
@@ -83,15 +87,16 @@ Offset<schema::Network> build_network(FlatBufferBuilder& b, const Network& netwo
   return schema::CreateNetwork(b, network.input_size, network.input_channels, layers);
 }
 
+Offset<schema::PoseStatistics> build_pose_statistics(FlatBufferBuilder& b, const PoseStatistics& statistics) {
+  return statistics.joints.empty() ? 0 : schema::CreatePoseStatistics(b, b.CreateVector(statistics.joints));
+}
+
 Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
   const auto body_name = b.CreateString(avatar.body_name), preset = b.CreateString(avatar.preset);
   const schema::MapStatistics statistics = build_map_statistics(avatar.map_statistics);
   const auto decoding = build_decoding(b, avatar.decoding);
   const auto network = build_network(b, avatar.network);
-  Offset<schema::PoseStatistics> pose_statistics = 0;
-  if (!avatar.pose_statistics.joints.empty()) {
-    pose_statistics = schema::CreatePoseStatistics(b, b.CreateVector(avatar.pose_statistics.joints));
-  }
+  const auto pose_statistics = build_pose_statistics(b, avatar.pose_statistics);
   const auto golden = build_golden(b, avatar.golden);
   const auto fixed_point = build_fixed_point(b, avatar.fixed_point);
   return schema::CreateAvatar(b, body_name, avatar.body_hash[0], avatar.body_hash[1], preset,
@@ -147,9 +152,36 @@ Offset<void> build_content(FlatBufferBuilder& b, const Population& population, s
       .Union();
 }
 
+Offset<void> build_content(FlatBufferBuilder& b, const Sampler& sampler) {
+  const auto body_name = b.CreateString(sampler.body_name);
+  const auto preset = b.CreateString(sampler.preset);
+  const auto network = build_network(b, sampler.network);
+  const schema::MapStatistics statistics = build_map_statistics(sampler.map_statistics);
+  const auto decoding = build_decoding(b, sampler.decoding);
+  const auto values = build_quantisation(b, sampler.values);
+  const auto pose_statistics = build_pose_statistics(b, sampler.pose_statistics);
+  const auto golden = build_golden(b, sampler.golden);
+  const auto ranks = b.CreateVector(sampler.ranks);
+  const DenoiserShape& d = sampler.denoiser;
+  const auto denoiser = schema::CreateDenoiser(b, d.d_model, d.blocks, d.heads, d.feed_forward);
+  const NoiseScheduleOptions& n = sampler.noise;
+  const auto noise = schema::CreateNoiseSchedule(b, n.dimension, n.noisy_dimension_snr, n.decided_dimension_snr, n.clean_snr, n.band_share);
+  const auto method = [](SolverMethod value) { return static_cast<schema::SolverMethod>(value); };
+  const auto golden_seeds = build_list(b, sampler.golden_seeds, [&](const GoldenSeed& golden_seed) {
+    return schema::CreateGoldenSeed(b, golden_seed.seed, golden_seed.steps, method(golden_seed.method), golden_seed.hash[0],
+                                    golden_seed.hash[1]);
+  });
+  return schema::CreateSampler(b, body_name, sampler.body_hash[0], sampler.body_hash[1], preset,
+                               static_cast<schema::TemplateMode>(sampler.template_mode), sampler.fourier_octaves, network,
+                               sampler.shape_count, &statistics, decoding, values, pose_statistics, golden, ranks, denoiser, noise,
+                               sampler.steps, method(sampler.method), golden_seeds, sampler.population_hash[0], sampler.population_hash[1])
+      .Union();
+}
+
 Offset<void> build_content(FlatBufferBuilder& b, const PackageParts& parts) {
   if (const auto* population = std::get_if<const Population*>(&parts.content))
     return build_content(b, **population, parts.member_provenance);
+  if (const auto* sampler = std::get_if<const Sampler*>(&parts.content)) return build_content(b, **sampler);
   if (const auto* avatar = std::get_if<const Avatar*>(&parts.content)) return build_content(b, **avatar);
   if (const auto* motion = std::get_if<const Motion*>(&parts.content)) return build_content(b, **motion);
   return build_content(b, **std::get_if<const Body*>(&parts.content));

@@ -71,6 +71,13 @@ void add_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& shapes
   }
 }
 
+void add_pose_statistics(const PoseStatistics& statistics, PartList& list) {
+  const size_t features = statistics.joints.size() * 3;
+  if (features == 0) return;
+  list.add("pose.mean", statistics.mean, {}, features);
+  list.add("pose.covariance", statistics.covariance, {static_cast<uint32_t>(features)}, features);
+}
+
 }  // namespace
 
 Result<PackageParts> take_apart(const Body& body, const Provenance& provenance) {
@@ -110,10 +117,7 @@ Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget, cons
     }
     add_fixed_point(avatar, *shapes, list);
   }
-  if (const size_t features = avatar.pose_statistics.joints.size() * 3; features != 0) {
-    list.add("pose.mean", avatar.pose_statistics.mean, {}, features);
-    list.add("pose.covariance", avatar.pose_statistics.covariance, {static_cast<uint32_t>(features)}, features);
-  }
+  add_pose_statistics(avatar.pose_statistics, list);
   list.add("golden.rotations", avatar.golden.rotations, {4});
   list.add("golden.png", avatar.golden.png);
   if (!list.status().ok()) return list.status();
@@ -165,6 +169,45 @@ Result<PackageParts> take_apart(const Population& population, const Budget& budg
     list.add("pose.factor", p.pose_factor, {features * (features + 1) / 2}, members);
   }
   if (!p.golden_poses.empty()) list.add("golden.rotations", p.golden_poses, {row_of(p.golden_poses) / 4, 4}, members);
+  if (!list.status().ok()) return list.status();
+  return parts;
+}
+
+Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget, const Provenance& provenance) {
+  PackageParts parts{.kind = PackageKind::kSampler, .content = &sampler, .budget = budget, .provenance = provenance};
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(sampler.network, false);
+  if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
+  const std::vector<size_t> tokens = sampler_token_sizes(sampler);
+  if (sampler.ranks.size() != tokens.size()) {
+    return Status(StatusCode::kInvalidArgument, "sampler.ranks: has " + std::to_string(sampler.ranks.size()) + " entries for " +
+                                                    std::to_string(tokens.size()) + " tokens");
+  }
+  if (sampler.denoiser.blocks > kMaxDenoiserBlocks) {
+    return Status(StatusCode::kInvalidArgument, "sampler.denoiser.blocks: is above " + std::to_string(kMaxDenoiserBlocks));
+  }
+  size_t values = 0, directions = 0, direction_bytes = 0, rows = 0, matrix_bytes = 0;
+  for (size_t token = 0; token < tokens.size(); ++token) {
+    values += tokens[token];
+    directions += sampler.ranks[token];
+    direction_bytes += sampler.ranks[token] * tokens[token];
+  }
+  for (const MatrixShape& matrix : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
+    rows += matrix.rows;
+    matrix_bytes += size_t{matrix.rows} * matrix.columns;
+  }
+  const uint32_t d = sampler.denoiser.d_model;
+  PartList list(parts.blobs);
+  list.add("space.mean", sampler.mean, {}, values);
+  list.add("space.directions", sampler.directions, {}, direction_bytes);
+  list.add("space.direction_scale", sampler.direction_scale, {}, directions);
+  list.add("denoiser.matrices", sampler.matrices, {}, matrix_bytes);
+  list.add("denoiser.row_scale", sampler.row_scale, {}, rows);
+  list.add("denoiser.bias", sampler.bias, {}, rows);
+  list.add("denoiser.position", sampler.position, {d}, tokens.size() + 1);
+  list.add("denoiser.norm", sampler.norm, {2, d}, size_t{2} * sampler.denoiser.blocks + 1);
+  add_pose_statistics(sampler.pose_statistics, list);
+  list.add("golden.rotations", sampler.golden.rotations, {4});
+  list.add("sampler.report", std::span(reinterpret_cast<const uint8_t*>(sampler.report.data()), sampler.report.size()));
   if (!list.status().ok()) return list.status();
   return parts;
 }

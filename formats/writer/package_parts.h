@@ -25,8 +25,8 @@ struct PackageParts {
   PackageKind kind = PackageKind::kBody;
   uint64_t required_features = 0;
   uint64_t optional_features = 0;
-  std::variant<const Body*, const Avatar*, const Motion*, const Population*>
-      content;  // borrowed; their arrays are taken from the blobs alone
+  // Borrowed; their arrays are taken from the blobs alone. In the order of the schema's Content.
+  std::variant<const Body*, const Avatar*, const Motion*, const Population*, const Sampler*> content;
   Budget budget;
   Provenance provenance;
   std::span<const Provenance> member_provenance;  // of a population; borrowed
@@ -39,6 +39,7 @@ Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget, cons
 Result<PackageParts> take_apart(const Motion& motion, const Provenance& provenance);
 Result<PackageParts> take_apart(const Population& population, const Budget& budget, const Provenance& provenance,
                                 std::span<const Provenance> own);
+Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget, const Provenance& provenance);
 
 // Header, index and blobs, sealed. The same parts give the same bytes.
 std::vector<std::byte> assemble(const PackageParts& parts);

@@ -47,4 +47,8 @@ Result<std::vector<std::byte>> write_package(const Population& population, const
   return assemble_and_verify(take_apart(population, budget, provenance, own), describe("population", population.name));
 }
 
+Result<std::vector<std::byte>> write_package(const Sampler& sampler, const Budget& budget, const Provenance& provenance) {
+  return assemble_and_verify(take_apart(sampler, budget, provenance), describe("sampler", sampler.name));
+}
+
 }  // namespace figurine

@@ -33,5 +33,7 @@ Result<std::vector<std::byte>> write_package(const Motion& motion, const Provena
 // own: one for each member, what its provenance has beside the package's (population_writer.h makes all four).
 Result<std::vector<std::byte>> write_package(const Population& population, const Budget& budget, const Provenance& provenance,
                                              std::span<const Provenance> own);
+// Of a golden frame with a picture or a hash: refused (sampler_writer.h leaves both out).
+Result<std::vector<std::byte>> write_package(const Sampler& sampler, const Budget& budget, const Provenance& provenance);
 
 }  // namespace figurine

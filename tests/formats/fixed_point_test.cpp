@@ -292,6 +292,29 @@ TEST(FixedPointValidation, RefusesQuantisationsThatDiffer) {
                  "layer 2: inputs and output do not share one quantisation");
 }
 
+TEST(QuantisationValidation, NeedsNoWeightsAndSaysWhatAWholeNetworkWould) {
+  Sample sample({.input_size = 4,
+                 .input_channels = 1,
+                 .layers = {convolution(0, 2, 3, true), {.op = LayerOp::kMaxPool2, .inputs = {1, 0}}, convolution(2, 3, 1)}});
+  EXPECT_TRUE(validate_quantisation(sample.network, sample.fixed.values).ok());
+  const auto refused = [&](const std::string& words, const std::function<void(Network&, std::vector<Quantisation>&)>& bend) {
+    Network network = sample.network;
+    FixedPointNetwork fixed = sample.fixed;
+    bend(network, fixed.values);
+    const Status status = validate_quantisation(network, fixed.values);
+    EXPECT_EQ(status.code(), StatusCode::kCorrupt);
+    EXPECT_NE(status.message().find(words), std::string::npos) << status.message();
+    EXPECT_EQ(validate_fixed_point(network, fixed).message(), status.message());
+  };
+  refused("not one entry per layer", [](Network&, std::vector<Quantisation>& values) { values.pop_back(); });
+  refused("value 1: the scale", [](Network&, std::vector<Quantisation>& values) { values[1].scale = kNan; });
+  refused("value 0: the zero point", [](Network&, std::vector<Quantisation>& values) { values[0].zero_point = 1; });
+  refused("layer 1: inputs and output do not share", [](Network&, std::vector<Quantisation>& values) { values[2].zero_point = 1; });
+  refused("layer 1: reads the int16 input", [](Network& network, std::vector<Quantisation>&) { network.layers[1].inputs[0] = 0; });
+  refused("layer 2: the last layer", [](Network& network, std::vector<Quantisation>&) { network.layers[2].relu = true; });
+  refused("layer 1: input is not an earlier", [](Network& network, std::vector<Quantisation>&) { network.layers[1].inputs[0] = 9; });
+}
+
 TEST(FixedPointValidation, RefusesAnInputReadByOthersAndAnEndThatIsNoHead) {
   expect_refused([](Sample& s) { s.network.layers[1].inputs[0] = 0; }, "layer 1: reads the int16 input");
   Sample joined({.input_size = 4,

@@ -64,7 +64,7 @@ void expect_refused(const Outcome& run, const std::string& words) {
 }
 
 TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
-  for (const std::string kind : {"body", "avatar", "fixed_point_avatar", "motion", "population", "half_population"}) {
+  for (const std::string kind : {"body", "avatar", "fixed_point_avatar", "motion", "population", "half_population", "sampler"}) {
     const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");
@@ -110,6 +110,62 @@ TEST(Inspect, ListsThePopulationsMembers) {
   EXPECT_TRUE(contains(diff.out, "/population/coding: \"q8\" -> \"f16\"")) << diff.out;
   EXPECT_TRUE(contains(diff.out, "population.difference: only in b")) << diff.out;
   EXPECT_TRUE(contains(inspect("population_v1.fgn --diff population_v1.fgn").out, "the same content"));
+}
+
+TEST(Inspect, SaysHowASamplerSamples) {
+  const Outcome run = inspect("sampler_v1.fgn --tensors");
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  for (const char* words :
+       {"kind              sampler", "MACs a frame      27352", "855 values on 24 directions, 16 tokens, 4639 bytes",
+        "d_model 8, 2 blocks, 2 heads, feed-forward 12, 1896 parameters, 4448 bytes", "dimension 24: 24 x SNR 0.125 at the noisy end",
+        "16 steps of dpmpp2m", "7, 16 steps of dpmpp2m: 11121314151617180102030405060708",
+        "18446744073709551615, 1000 steps of ddim: 3132333435363738", "population 51525354555657584142434445464748",
+        "14  layer 23           69        1", "15  shape               2        2", "/held_out/psnr_pose_db/0  21.25",
+        "denoiser.norm             f32  [5,2,8]", "input int16             0.000244141     0", "23    conv 1x1                float"}) {
+    EXPECT_TRUE(contains(run.out, words)) << words << "\n" << run.out;
+  }
+
+  samples::SamplerSample sample;
+  sample.sampler.steps = 12;
+  sample.report = "{\"held_out\": {\"psnr_pose_db\": [21.25, 20.0]}}";
+  sample.sampler.report = sample.report;
+  sample.matrices[5] = 0;
+  const Outcome diff = inspect("sampler_v1.fgn --diff " + write_bytes("sampler.fgn", *sample.write()));
+  for (const char* words : {"/sampler/steps: 16 -> 12", "/sampler/report/held_out/psnr_pose_db/1: 20.5 -> 20.0",
+                            "denoiser.matrices: 1 of 1408 values differ", "sampler.report: u8 [92] -> u8"}) {
+    EXPECT_TRUE(contains(diff.out, words)) << words << "\n" << diff.out;
+  }
+}
+
+TEST(Inspect, ShowsAReportWhateverItsText) {
+  const auto inspected = [](const std::string& report, const std::string& options) {
+    samples::SamplerSample sample;
+    sample.sampler.report = report;
+    const Outcome run = inspect(write_bytes("report.fgn", *sample.write()) + options);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return run.out;
+  };
+  EXPECT_TRUE(contains(inspected("", " --json"), "\"report\": null"));
+  EXPECT_FALSE(contains(inspected("", ""), "evaluation"));
+  EXPECT_TRUE(contains(inspected("no JSON", " --json"), "\"report\": \"no JSON\""));
+  // What JSON's escapes hide is printed as escapes.
+  const std::string escaped = inspected("{\"\\u001b[2J\": \"\\u009b31m\"}", "");
+  EXPECT_TRUE(contains(escaped, "/\\u001b[2J  \"\\u009b31m\"")) << escaped;
+  // Nested beyond what a walk on the stack can bear: a text.
+  const std::string deep(200'000, '[');
+  EXPECT_TRUE(contains(inspected(deep, ""), "[[[["));
+  EXPECT_TRUE(contains(inspected(std::string(40, '[') + std::string(40, ']'), " --json"), "\"report\": \"[[[["));
+  EXPECT_TRUE(contains(inspected(std::string(100'000, '[') + std::string(100'000, ']'), " --json"), "\"report\": \"[[[["));
+  const std::string many = inspected(
+      "[1" + std::string(200, ' ') +
+          [] {
+            std::string rest;
+            for (int i = 2; i <= 50; ++i) rest += "," + std::to_string(i);
+            return rest;
+          }() +
+          "]",
+      "");
+  EXPECT_TRUE(contains(many, "/39  40\n  and 10 more")) << many;
 }
 
 TEST(Inspect, RefusesUnsoundPackagesWithOneLine) {

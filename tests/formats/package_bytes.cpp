@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "formats/src/checksum.h"
+#include "formats/src/package_text.h"
 #include "formats/writer/package_writer.h"
 
 namespace figurine::samples {
@@ -132,6 +133,12 @@ bool exercise_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& s
   return all_finite(evaluate_fixed_point(avatar.network, avatar.fixed_point, input).result);
 }
 
+bool exercise_golden(const GoldenFrame& golden) {
+  if (golden.rotations.empty()) return golden.png.empty();
+  const uint32_t joints = static_cast<uint32_t>(golden.rotations.size() / 4);
+  return validate_camera(golden.camera).ok() && validate_pose({golden.root_translation_m, golden.rotations}, joints).ok();
+}
+
 bool exercise_avatar(const Avatar& avatar, std::string& reason) {
   reason = "shapes or weights of the network";
   const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, avatar.holds(Precision::kFloat32));
@@ -146,10 +153,7 @@ bool exercise_avatar(const Avatar& avatar, std::string& reason) {
   if (avatar.pose_statistics.mean.size() != features || avatar.pose_statistics.covariance.size() != features * features) return false;
   if (!all_finite(avatar.shape) || !all_finite(avatar.pose_statistics.mean) || !all_finite(avatar.pose_statistics.covariance)) return false;
   reason = "golden frame";
-  if (avatar.golden.rotations.empty()) return avatar.golden.png.empty();
-  const uint32_t joints = static_cast<uint32_t>(avatar.golden.rotations.size() / 4);
-  return validate_camera(avatar.golden.camera).ok() &&
-         validate_pose({avatar.golden.root_translation_m, avatar.golden.rotations}, joints).ok();
+  return exercise_golden(avatar.golden);
 }
 
 // Every member as an avatar, in storage that ends where its floats end.
@@ -163,6 +167,53 @@ bool exercise_population(const Population& population, std::string& reason) {
     if (find_member(population, avatar.name) != m || population.members[m].quality.size() != population.quality_names.size()) return false;
   }
   return true;
+}
+
+// What a device does with a sampler, with its products in plain loops: the first direction of every token to weights, an evaluation of each
+// matrix, the noise levels of its steps.
+bool exercise_sampler(const Sampler& sampler, std::string& reason) {
+  reason = "the values' quantisation";
+  if (!validate_quantisation(sampler.network, sampler.values).ok()) return false;
+  reason = "the space of weights";
+  const std::vector<size_t> tokens = sampler_token_sizes(sampler);
+  if (sampler.ranks.size() != tokens.size()) return false;
+  size_t value = 0, direction = 0, byte = 0;
+  for (size_t token = 0; token < tokens.size(); ++token) {
+    for (size_t k = 0; k < sampler.ranks[token]; ++k, ++direction) {
+      for (size_t i = 0; i < tokens[token]; ++i, ++byte) {
+        const int8_t q = sampler.directions[byte];
+        if (q < -127 || !std::isfinite(sampler.mean[value + i] + sampler.direction_scale[direction] * static_cast<float>(q))) return false;
+      }
+    }
+    value += tokens[token];
+  }
+  if (value != sampler.mean.size() || direction != sampler.direction_scale.size() || byte != sampler.directions.size()) return false;
+  reason = "the denoiser";
+  size_t row = 0;
+  byte = 0;
+  for (const MatrixShape& matrix : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
+    for (uint32_t n = 0; n < matrix.rows; ++n, ++row) {
+      float sum = 0;
+      for (uint32_t k = 0; k < matrix.columns; ++k) sum += static_cast<float>(sampler.matrices[byte++]);
+      if (!std::isfinite(sampler.row_scale[row] * sum + sampler.bias[row]) || !(sampler.row_scale[row] > 0)) return false;
+    }
+  }
+  const size_t d = sampler.denoiser.d_model;
+  if (byte != sampler.matrices.size() || row != sampler.bias.size() || sampler.position.size() != (tokens.size() + 1) * d) return false;
+  if (sampler.norm.size() != (2 * sampler.denoiser.blocks + 1) * 2 * d || d % (2 * sampler.denoiser.heads) != 0) return false;
+  if (!all_finite(sampler.position) || !all_finite(sampler.norm)) return false;
+  reason = "the noise schedule";
+  const Result<NoiseSchedule> schedule = NoiseSchedule::create(sampler.noise);
+  if (!schedule.ok()) return false;
+  std::vector<NoiseLevel> levels(size_t{sampler.steps} + 1);
+  solver_levels(*schedule, true, levels);
+  for (const GoldenSeed& golden : sampler.golden_seeds) {
+    if (golden.steps < 1 || golden.steps > kMaxSolverSteps) return false;
+  }
+  reason = "pose statistics, golden pose or report";
+  const size_t features = sampler.pose_statistics.joints.size() * 3;
+  if (sampler.pose_statistics.mean.size() != features || sampler.pose_statistics.covariance.size() != features * features) return false;
+  return is_clean_text(sampler.report, true) && sampler.golden.png.empty() && exercise_golden(sampler.golden);
 }
 
 }  // namespace
@@ -185,6 +236,8 @@ bool exercise(const Package& package, std::string& reason) {
       for (size_t m = 0; m < package.population().size(); ++m) static_cast<void>(package.member_provenance(m));
       return exercise_population(package.population(), reason);
     }
+    case PackageKind::kSampler:
+      return exercise_sampler(package.sampler(), reason);
   }
   reason = "an unknown kind";
   return false;

@@ -63,7 +63,8 @@ void put_header(std::span<std::byte> bytes, layout::Header header);  // seals th
 void put_u64(std::span<std::byte> bytes, size_t at, uint64_t value);
 uint64_t get_u64(std::span<const std::byte> bytes, size_t at);
 
-// Reads every value, draws a body's maps, walks every pose, and compares the network's shapes with its weights. False, with the reason, if
+// Reads every value, draws a body's maps, walks every pose, compares the network's shapes with its weights, and multiplies by a sampler's
+// matrices. False, with the reason, if
 // something is not what an opened package promises.
 bool exercise(const Package& package, std::string& reason);
 

@@ -46,7 +46,8 @@ TEST(PackageGolden, TodaysReaderReadsTheGoldenBytes) {
                                                          {SampleKind::kFixedPointAvatar, "5f5e04dbda2fb6ac6e9152773c882959"},
                                                          {SampleKind::kMotion, "4c9a33c1c2bc8e307e13fe60efd5964d"},
                                                          {SampleKind::kPopulation, "07e8b960a4b16e5b3edda84e1d2b9838"},
-                                                         {SampleKind::kHalfPopulation, "9534fbbf8f780e60bf2c31480e6a566a"}};
+                                                         {SampleKind::kHalfPopulation, "9534fbbf8f780e60bf2c31480e6a566a"},
+                                                         {SampleKind::kSampler, "37c01096e6a65cd32cc813da0c34f7b8"}};
   for (const auto& [kind, hash] : expected) {
     const samples::ExactBytes bytes(read_golden(kind));
     const Result<Package> package = Package::open(bytes.bytes(), golden_path(kind));

@@ -120,14 +120,14 @@ TEST_P(PackageOpen, RejectsEachUnknownRequiredFeatureAndIgnoresOptionalOnes) {
 
 TEST_P(PackageOpen, RejectsOtherKinds) {
   const uint32_t own = uint32_t(samples::package_kind(GetParam()));
-  for (uint32_t kind : {0u, 1u, 2u, 3u, 4u, 5u, 6u, UINT32_MAX}) {
+  for (uint32_t kind : {0u, 1u, 2u, 3u, 4u, 5u, 6u, 7u, UINT32_MAX}) {
     Bytes bytes = sound();
     layout::Header header = get_header(bytes);
     header.kind = kind;
     put_header(bytes, header);
     if (kind == own) {
       EXPECT_TRUE(open_status(bytes).ok());
-    } else if (kind >= 1 && kind <= 4) {
+    } else if (kind >= 1 && kind <= 5) {
       expect_refused(open_status(bytes), StatusCode::kCorrupt, "index.content");
     } else {
       expect_refused(open_status(bytes), StatusCode::kUnsupported, "header.kind");

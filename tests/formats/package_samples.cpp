@@ -187,6 +187,8 @@ PackageKind package_kind(SampleKind kind) {
     case SampleKind::kPopulation:
     case SampleKind::kHalfPopulation:
       return PackageKind::kPopulation;
+    case SampleKind::kSampler:
+      return PackageKind::kSampler;
   }
   return {};
 }
@@ -205,8 +207,77 @@ Result<std::vector<std::byte>> write_sample(SampleKind kind) {
       return PopulationSample(DifferenceCoding::kInt8).write();
     case SampleKind::kHalfPopulation:
       return PopulationSample(DifferenceCoding::kHalf).write();
+    case SampleKind::kSampler:
+      return SamplerSample().write();
   }
   return Status(StatusCode::kInvalidArgument, "no such sample");
+}
+
+SamplerSample::SamplerSample() {
+  const FixedPointAvatarSample avatar;
+  const Avatar& from = avatar.avatar;
+  sampler = {.name = "sample sampler",
+             .body_name = from.body_name,
+             .body_hash = from.body_hash,
+             .preset = from.preset,
+             .template_mode = from.template_mode,
+             .fourier_octaves = from.fourier_octaves,
+             .network = from.network,
+             .shape_count = 2,
+             .map_statistics = from.map_statistics,
+             .decoding = from.decoding,
+             .values = from.fixed_point.values};
+  const std::vector<size_t> tokens = sampler_token_sizes(sampler);
+  for (size_t token = 0; token < tokens.size(); ++token) {
+    const auto rank = static_cast<uint32_t>(token % 2 + 1);
+    sampler.ranks.push_back(rank);
+    for (size_t k = 0; k < rank * tokens[token]; ++k) directions.push_back(static_cast<int8_t>(int(k * 29 + token) % 255 - 127));
+    for (uint32_t k = 0; k < rank; ++k) direction_scale.push_back(token == 3 && k == 1 ? 0 : 0x1p-12f * static_cast<float>(token + 1));
+    for (size_t i = 0; i < tokens[token]; ++i) mean.push_back(pattern(i + token));
+  }
+  sampler.denoiser = {.d_model = 8, .blocks = 2, .heads = 2, .feed_forward = 12};
+  size_t rows = 0;
+  for (const MatrixShape& matrix : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
+    for (size_t k = 0; k < size_t{matrix.rows} * matrix.columns; ++k) {
+      matrices.push_back(static_cast<int8_t>(int(k * 53 + rows) % 255 - 127));
+    }
+    rows += matrix.rows;
+  }
+  for (size_t n = 0; n < rows; ++n) row_scale.push_back(0x1p-10f * static_cast<float>(n % 3 + 1));
+  bias = patterned(rows);
+  position = patterned((tokens.size() + 1) * sampler.denoiser.d_model);
+  norm = patterned(size_t{2 * sampler.denoiser.blocks + 1} * 2 * sampler.denoiser.d_model);
+  pose_mean = avatar.pose_mean;
+  pose_covariance = avatar.pose_covariance;
+  golden_rotations = avatar.golden_rotations;
+  report = "{\n  \"command\": \"sample\",\n  \"held_out\": {\"psnr_pose_db\": [21.25, 20.5], \"name\": \"m\xC3\xBCller\"}\n}\n";
+  sampler.mean = mean;
+  sampler.directions = directions;
+  sampler.direction_scale = direction_scale;
+  sampler.matrices = matrices;
+  sampler.row_scale = row_scale;
+  sampler.bias = bias;
+  sampler.position = position;
+  sampler.norm = norm;
+  sampler.pose_statistics = {.joints = from.pose_statistics.joints, .mean = pose_mean, .covariance = pose_covariance};
+  sampler.golden = from.golden;  // its picture and its hash are an avatar's
+  sampler.golden.rotations = golden_rotations;
+  sampler.golden.png = {};
+  sampler.golden.fixed_point_hash = {0, 0};
+  sampler.golden.fixed_point_library.clear();
+  sampler.noise = {.dimension = direction_scale.size(),
+                   .noisy_dimension_snr = 0.125,
+                   .decided_dimension_snr = 128,
+                   .clean_snr = 8192,
+                   .band_share = 0.75};
+  sampler.steps = 16;
+  sampler.method = SolverMethod::kDpmSolverPlusPlus2M;
+  sampler.golden_seeds = {
+      {.seed = 7, .steps = 16, .method = SolverMethod::kDpmSolverPlusPlus2M, .hash = {0x0102030405060708u, 0x1112131415161718u}},
+      {.seed = 0xFFFFFFFFFFFFFFFFu, .steps = 1000, .method = SolverMethod::kDdim, .hash = {0x2122232425262728u, 0x3132333435363738u}}};
+  sampler.population_hash = {0x4142434445464748u, 0x5152535455565758u};
+  sampler.report = report;
+  budget = avatar.budget;
 }
 
 MotionSample::MotionSample() {

@@ -1,6 +1,6 @@
 // Small sound packages of each kind, with the storage behind their spans, for the tests of the package: a body of 3 joints and 5 texels on
-// an 8x8 map, an avatar of a four-resolution UNet with 2 channels, a motion of 3 frames. All values are exact in binary, so the bytes are
-// the same everywhere.
+// an 8x8 map, an avatar of a four-resolution UNet with 2 channels, a motion of 3 frames, a sampler of such avatars. All values are exact in
+// binary, so the bytes are the same everywhere.
 #pragma once
 
 #include <cstddef>
@@ -12,6 +12,7 @@
 #include "figurine/package.h"
 #include "formats/writer/package_writer.h"
 #include "formats/writer/population_writer.h"
+#include "formats/writer/sampler_writer.h"
 
 namespace figurine::samples {
 
@@ -77,10 +78,27 @@ struct MotionSample {
   Result<std::vector<std::byte>> write() const { return write_package(motion, make_provenance()); }
 };
 
+// Samples avatars like AvatarSample: 16 tokens of rank 1 or 2, a denoiser of two blocks.
+struct SamplerSample {
+  SamplerSample();
+  SamplerSample(const SamplerSample&) = delete;
+  std::vector<float> mean, direction_scale, row_scale, bias, position, norm;
+  std::vector<int8_t> directions, matrices;
+  std::vector<float> pose_mean, pose_covariance, golden_rotations;
+  std::string report;
+  Sampler sampler;
+  Budget budget;
+
+  Result<std::vector<std::byte>> write() const {
+    return write_sampler({.sampler = &sampler, .budget = budget, .provenance = make_provenance()});
+  }
+};
+
 // One of each, for tests of what all packages have in common.
-enum class SampleKind { kBody, kAvatar, kFixedPointAvatar, kMotion, kPopulation, kHalfPopulation };
+enum class SampleKind { kBody, kAvatar, kFixedPointAvatar, kMotion, kPopulation, kHalfPopulation, kSampler };
 inline constexpr SampleKind kSampleKinds[] = {SampleKind::kBody,   SampleKind::kAvatar,     SampleKind::kFixedPointAvatar,
-                                              SampleKind::kMotion, SampleKind::kPopulation, SampleKind::kHalfPopulation};
+                                              SampleKind::kMotion, SampleKind::kPopulation, SampleKind::kHalfPopulation,
+                                              SampleKind::kSampler};
 std::string to_string(SampleKind kind);  // also the name of its golden file: "fixed_point_avatar"
 PackageKind package_kind(SampleKind kind);
 Result<std::vector<std::byte>> write_sample(SampleKind kind);

@@ -82,6 +82,8 @@ inline int8_t requantise(int32_t sum, float multiplier, int32_t zero_point, int3
 // pool, upsample and concatenation with equal quantisation on all sides; value 0 read by convolutions alone, with zero point 0; the last
 // layer a convolution without ReLU whose result nobody reads. kCorrupt "fixed point: layer N: ...".
 Status validate_fixed_point(const Network& network, const FixedPointNetwork& fixed);
+// The part of it that no weights are needed for: the values' count, scales, zero points and ties, and the last layer.
+Status validate_quantisation(const Network& network, std::span<const Quantisation> values);
 
 // What one evaluation made of every value, for tests and for the trainer.
 struct FixedPointValues {

@@ -19,6 +19,7 @@
 #include "figurine/body.h"
 #include "figurine/motion.h"
 #include "figurine/population.h"
+#include "figurine/sampler.h"
 #include "figurine/status.h"
 
 namespace figurine {
@@ -30,7 +31,7 @@ inline constexpr size_t kBlobAlignment = 64;
 // Bits of the header's required features.
 inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1} << 0;  // an avatar's network is there in fixed point
 
-enum class PackageKind : uint8_t { kBody = 1, kAvatar = 2, kMotion = 3, kPopulation = 4 };
+enum class PackageKind : uint8_t { kBody = 1, kAvatar = 2, kMotion = 3, kPopulation = 4, kSampler = 5 };
 const char* to_string(PackageKind kind);
 
 enum class DataType : uint8_t { kF32 = 0, kU8 = 1, kI16 = 2, kU32 = 3, kI8 = 4, kI32 = 5, kF16 = 6 };
@@ -105,6 +106,7 @@ class Package {
   const Avatar& avatar() const;          // kind must be kAvatar
   const Motion& motion() const;          // kind must be kMotion
   const Population& population() const;  // kind must be kPopulation
+  const Sampler& sampler() const;        // kind must be kSampler
   const Budget& budget() const;
   const Provenance& provenance() const;
   // Of a population's member: the package's, with what is the member's own, its quality among it. kind must be kPopulation.
