@@ -1,0 +1,35 @@
+// Kernel distance of two sets of features (KID where they are Inception's): the unbiased estimate of the squared maximum mean discrepancy
+// with the cubic kernel k(x,y) = (x.y / F + 1)^3. Unbiased, so sets of different sizes may be compared, and below 0 where they are alike.
+//
+// Letters: n, m items of the two sets, F features of an item.
+//
+//   1/(n (n-1)) sum_{i /= j} k(a_i,a_j) + 1/(m (m-1)) sum_{i /= j} k(b_i,b_j) - 2/(n m) sum_{i,j} k(a_i,b_j)
+//
+// Based on: Gretton et al., A Kernel Two-Sample Test, 2012, equation 3; Binkowski et al., Demystifying MMD GANs, 2018 (kernel, subsets).
+// Published tables often print 1,000 times the value.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "toolchain/evaluate/weight_space.h"
+
+namespace figurine::evaluate {
+
+// a: [n,F], b: [m,F]. Throws InputError below two items in a set, for different F, or for values that are not finite.
+double kernel_distance(const RowMatrix& a, const RowMatrix& b);
+
+struct KernelSubsets {
+  size_t subsets = 100;
+  size_t size = 1000;  // items of a subset, of either set
+  uint64_t seed = 0;
+};
+
+struct KernelDistance {
+  double mean = 0;
+  double deviation = 0;  // standard deviation over the subsets
+};
+// Over random subsets without repetition, subset i from (seed, i) alone. Throws InputError also for no subset, or one larger than a set.
+KernelDistance kernel_distance(const RowMatrix& a, const RowMatrix& b, const KernelSubsets& subsets);
+
+}  // namespace figurine::evaluate
