@@ -222,6 +222,8 @@ void add_evaluate_command(CLI::App& app) {
   population->callback([arguments] { run_population(*arguments); });
 
   add_evaluate_members_command(*command);
+  add_evaluate_generation_command(*command);
+  add_evaluate_sampling_command(*command);
 
   CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, before rounding to 8 bits");
   add_run_options(parity, arguments);

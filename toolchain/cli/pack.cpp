@@ -1,4 +1,4 @@
-// figurine-train pack: a run as an avatar package, or many avatars as a population package.
+// figurine-train pack: a run as an avatar or sampler package, or many avatars as a population package.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -9,6 +9,8 @@
 #include "ports/linux/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
+#include "toolchain/generate/pack_sampler.h"
+#include "toolchain/generate/sampler_trainer.h"
 #include "toolchain/quantize/fine_tune.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
@@ -28,6 +30,8 @@ struct PackArguments {
   std::string precision, output;
   bool fine_tune = false;
   quantize::FineTuneOptions fine_tuning;
+  generate::PackSamplerOptions sampler;
+  std::string solver;
 };
 
 // Package bytes must be aligned as a memory map is.
@@ -106,9 +110,27 @@ void run_avatar(PackArguments arguments) {
               static_cast<double>(options.peak_memory_bytes) / 1e3);
 }
 
-// What CLI11 cannot see: which options belong to which of the two.
+void run_sampler(const PackArguments& arguments) {
+  generate::PackSamplerOptions options = arguments.sampler;
+  options.run = arguments.inputs.front();
+  options.body = arguments.open.body;
+  options.name = arguments.pack.name;
+  options.threads = arguments.open.threads;
+  if (arguments.solver == "ddim") options.method = SolverMethod::kDdim;
+  const std::vector<std::byte> bytes = generate::pack_sampler(options);
+  throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
+  std::printf("%s: %zu bytes\n", arguments.output.c_str(), bytes.size());
+}
+
+bool is_sampler(const std::vector<std::string>& inputs) { return inputs.size() == 1 && generate::is_sampler_run(inputs.front()); }
+
+// What CLI11 cannot see: which options belong to which of the three.
 void run(const PackArguments& arguments) {
   PackArguments chosen = arguments;
+  if (!chosen.is_population && is_sampler(chosen.inputs)) {
+    if (!chosen.precision.empty() && chosen.precision != "q8") throw CLI::ValidationError("--precision", "a sampler is q8");
+    return run_sampler(chosen);
+  }
   if (chosen.precision.empty()) chosen.precision = chosen.is_population ? "q8" : "f32";
   const bool fits = chosen.is_population ? chosen.precision == "q8" || chosen.precision == "f16" : chosen.precision != "f16";
   if (!fits) throw CLI::ValidationError("--precision", chosen.is_population ? "q8 or f16 with --population" : "f16 is for --population");
@@ -121,7 +143,7 @@ void run(const PackArguments& arguments) {
 void add_pack_command(CLI::App& app) {
   auto arguments = std::make_shared<PackArguments>();
   arguments->open.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
-  CLI::App* command = app.add_subcommand("pack", "Write a run's avatar as a package, or many as a population");
+  CLI::App* command = app.add_subcommand("pack", "Write a run's avatar or sampler as a package, or many avatars as a population");
   command->add_option("RUN", arguments->inputs, "Folder of a run; with --population also avatar packages, and folders of them")->required();
   command->add_option("-o,--output", arguments->output, "Package to write")->required();
   command->add_option("--data", arguments->open.data, "Where the data is now (default: where the run found it)");
@@ -145,6 +167,13 @@ void add_pack_command(CLI::App& app) {
   CLI::Option* qat =
       command->add_flag("--qat", arguments->fine_tune, "Fine-tune for fixed point first, in RUN/qat; the run's own weights stay");
   qat->excludes(population);
+  command->add_option("--population-file", arguments->sampler.population,
+                      "Of a sampler: where its population is now (default: where the run found it)");
+  command->add_option("--report", arguments->sampler.report, "Of a sampler: JSON of evaluate generation, to be carried along");
+  command->add_option("--steps", arguments->sampler.steps, "Of a sampler: evaluations where nobody says otherwise (default 20)")
+      ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
+  command->add_option("--solver", arguments->solver, "Of a sampler: where nobody says otherwise (default dpmpp2m)")
+      ->check(CLI::IsMember({"ddim", "dpmpp2m"}));
   command->add_option("--qat-iterations", arguments->fine_tuning.iterations, "Of the fine-tune (default 400)")->check(CLI::PositiveNumber);
   command->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
   command->add_flag("--golden,!--no-golden", arguments->pack.golden, "Carry an expected picture (default)");

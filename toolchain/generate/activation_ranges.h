@@ -16,8 +16,8 @@ struct ActivationRanges {
 };
 
 // Runs every training member in float in `poses` poses: golden poses of training members, as different from each other as they can be. The
-// ranges are chosen from all of their values together. Throws InputError if there is no preset of the population's name, or the body is
-// another.
+// ranges are chosen from all of their values together. Throws InputError if the body is another, or if no training member has a golden
+// pose.
 ActivationRanges observe_training_members(const Population& population, const Package& body, uint32_t poses,
                                           const quantize::CalibrationOptions& options, bool quiet = false);
 

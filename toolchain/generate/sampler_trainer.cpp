@@ -377,6 +377,13 @@ RowMatrix rows_of(const Population& population, const RowMatrix& weights, Split 
   return weights(rows, Eigen::all);
 }
 
+bool is_sampler_run(const std::string& path) {
+  const train::RunDirectory run{path};
+  if (!std::filesystem::exists(run.run_json())) return false;
+  const nlohmann::json json = train::read_json(run.run_json());
+  return json.is_object() && json.contains("population") && json.contains("training_members");
+}
+
 SamplerResult train_sampler(const SamplerRequest& request) {
   const train::RunDirectory run{request.run};
   const bool exists = std::filesystem::exists(run.run_json());

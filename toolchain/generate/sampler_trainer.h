@@ -48,6 +48,9 @@ SamplerResult train_sampler(const SamplerRequest& request);
 // The rows of a population's weights that belong to one part, in its order: [M,W]. At most `most` of them, 0: all.
 evaluate::RowMatrix rows_of(const Population& population, const evaluate::RowMatrix& weights, Split split, uint32_t most = 0);
 
+// Whether a folder holds a run of a sampler, rather than of an avatar or nothing.
+bool is_sampler_run(const std::string& path);
+
 // A trained sampler: its space is built again from the population, whose hash must be the run's.
 struct TrainedSampler {
   std::unique_ptr<train::PackageFile> population;

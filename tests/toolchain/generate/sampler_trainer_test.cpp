@@ -9,9 +9,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "formats/writer/population_writer.h"
-#include "ports/linux/files.h"
-#include "runtime/test_packages.h"
+#include "tests/toolchain/generate/small_people.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/tensor_file.h"
@@ -21,33 +19,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Five members train, one validates, one tests; `bend_test` changes the weights of the last.
-void write_people(const std::string& path, bool bend_test = false) {
-  const tests::SyntheticBody body = tests::make_test_body();
-  const tests::SyntheticAvatar initial = tests::make_test_avatar(body, {.seed = 99});
-  std::vector<tests::SyntheticAvatar> avatars;
-  for (size_t m = 0; m < 7; ++m) {
-    const uint64_t seed = m == 6 && bend_test ? 1000 : m;
-    avatars.push_back(
-        tests::make_test_avatar(body, {.shape = {0.1f * static_cast<float>(m), 0.2f}, .seed = seed, .name = "person" + std::to_string(m)}));
-  }
-  NewPopulation population{.name = "people", .initial = initial.package->avatar().network};
-  for (size_t m = 0; m < avatars.size(); ++m) {
-    const Split split = m < 5 ? Split::kTrain : m == 5 ? Split::kValidation : Split::kTest;
-    population.members.push_back({&avatars[m].package->avatar(), &avatars[m].package->provenance(), split});
-  }
-  const auto bytes = write_population(population);
-  ASSERT_TRUE(bytes.ok()) << bytes.status().message();
-  ASSERT_TRUE(ports::write_file_atomically(path, *bytes).ok());
-}
-
 class SamplerTraining : public testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::temp_directory_path() / ("sampler_trainer_test_" + std::to_string(getpid()));
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    write_people(path("people.fgn"));
+    tests::write_people(path("people.fgn"));
   }
   void TearDown() override { fs::remove_all(folder_); }
 
@@ -117,7 +95,7 @@ TEST_F(SamplerTraining, GoesOnWithTheSameBits) {
 
 TEST_F(SamplerTraining, NeverLooksAtTheTestPart) {
   train_sampler(request("before"));
-  write_people(path("people.fgn"), true);
+  tests::write_people(path("people.fgn"), true);
   train_sampler(request("after"));
   EXPECT_EQ(weights("after"), weights("before"));
 }
@@ -129,7 +107,7 @@ TEST_F(SamplerTraining, OpensWhatItTrained) {
   EXPECT_EQ(static_cast<size_t>(sampler.training.cols()), sampler.space->size());
   const std::vector<float> kept = weights("run");
   EXPECT_EQ(static_cast<size_t>(sampler.transformer->weights().numel()), kept.size());
-  write_people(path("people.fgn"), true);
+  tests::write_people(path("people.fgn"), true);
   EXPECT_THROW(TrainedSampler::open(path("run")), InputError) << "another population";
 }
 
@@ -149,7 +127,7 @@ TEST_F(SamplerTraining, NamesWhatIsWrong) {
   SamplerRequest heads = request("heads");
   heads.settings.shape.heads = 5;
   EXPECT_NE(refusal(heads).find("d_model"), std::string::npos);
-  write_people(path("people.fgn"), true);
+  tests::write_people(path("people.fgn"), true);
   SamplerRequest moved = request("run");
   moved.resume = true;
   EXPECT_NE(refusal(moved).find("was trained on population"), std::string::npos);

@@ -1,0 +1,171 @@
+// figurine-train evaluate generation, evaluate sampling: what trained samplers draw, and what the number of evaluations costs and buys.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "toolchain/cli/commands.h"
+#include "toolchain/error.h"
+#include "toolchain/evaluate/generation.h"
+#include "toolchain/generate/sampler_trainer.h"
+#include "toolchain/train/package_file.h"
+#include "toolchain/train/run_directory.h"
+#include "toolchain/verify/float_sampler.h"
+#include "toolchain/verify/sampling_error.h"
+
+namespace figurine::cli {
+
+namespace {
+
+struct GenerationArguments {
+  std::string population, body, output;
+  std::vector<std::string> runs;
+  verify::DrawOptions draw;
+  evaluate::GenerationOptions options;
+  size_t rank = 64;
+  uint32_t threads = 1;
+  bool quiet = false;
+};
+
+nlohmann::json head() {
+  return {{"command", train::current_command()},
+          {"commit", train::current_commit()},
+          {"machine", train::describe_machine()},
+          {"date", train::utc_now()}};
+}
+
+double number(const nlohmann::json& value) { return value.is_number() ? value.get<double>() : NAN; }
+
+void print_rows(const nlohmann::json& rows) {
+  std::printf("%-38s %21s %21s %17s %17s %10s\n", "", "held out: MMD, COV", "1-NNA", "train: MMD, COV", "copies, ratio", "high-pass");
+  for (const nlohmann::json& row : rows) {
+    std::printf("%-38s", row.at("name").get<std::string>().c_str());
+    if (row.contains("held_out")) {
+      const nlohmann::json& held_out = row.at("held_out");
+      std::printf(" %12.2f dB %5.1f %% %19.1f %%", number(held_out.at("mmd_psnr_db").at("value")),
+                  number(held_out.at("coverage_percent").at("value")), number(held_out.at("one_nna_percent").at("value")));
+    }
+    if (row.contains("train")) {
+      std::printf(" %8.2f dB %5.1f %%", number(row.at("train").at("mmd_psnr_db").at("value")),
+                  number(row.at("train").at("coverage_percent").at("value")));
+    }
+    if (row.contains("novelty")) {
+      const nlohmann::json& pictures = row.at("novelty").at("pictures");
+      std::printf(" %8.0f %% %6.2f %10.2f", 100 * number(pictures.at("copy_share")), number(pictures.at("median_ratio")),
+                  number(row.at("highpass_ratio")));
+    }
+    std::printf("\n");
+  }
+}
+
+// "NAME=RUN", or RUN alone, which is then called as its folder is.
+std::pair<std::string, std::string> named_run(const std::string& text) {
+  const size_t equals = text.find('=');
+  if (equals != std::string::npos) return {text.substr(0, equals), text.substr(equals + 1)};
+  return {std::filesystem::path(text).filename().string(), text};
+}
+
+void run_generation(const GenerationArguments& arguments) {
+  at::set_num_threads(static_cast<int>(arguments.threads));
+  const train::PackageFile population = train::open_package(arguments.population, PackageKind::kPopulation);
+  const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
+  const evaluate::MemberSet set(population.package, body.package, {.threads = arguments.threads, .quiet = arguments.quiet});
+  std::vector<evaluate::Generated> generated;
+  nlohmann::json runs = nlohmann::json::array();
+  for (const std::string& text : arguments.runs) {
+    const auto [name, path] = named_run(text);
+    const generate::TrainedSampler sampler = generate::TrainedSampler::open(path, arguments.population);
+    verify::DrawOptions draw = arguments.draw;
+    draw.count = std::max(set.training.size(), set.held_out.size());
+    const auto start = std::chrono::steady_clock::now();
+    generated.push_back({name, set.standardisation.standardise(verify::draw_weights(sampler, draw))});
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const nlohmann::json description = train::read_json(train::RunDirectory{path}.run_json());
+    nlohmann::json run{{"name", name}, {"seconds_per_sample", seconds / static_cast<double>(draw.count)}};
+    for (const char* key : {"settings", "parameters", "macs_per_evaluation", "iterations", "train_seconds", "loss", "validation_loss"}) {
+      if (description.contains(key)) run[key] = description.at(key);
+    }
+    runs.push_back(std::move(run));
+  }
+  const double noised_db = generated.empty() ? 20 : evaluate::nearest_member_db(set, generated.front());
+  for (evaluate::Generated& baseline : evaluate::make_baselines(set, arguments.rank, noised_db, arguments.options.seed)) {
+    generated.push_back(std::move(baseline));
+  }
+  nlohmann::json report = head();
+  report["evaluations"] = arguments.draw.steps;
+  report["noised_members_db"] = noised_db;
+  report["runs"] = runs;
+  report.update(evaluate::evaluate_generation(set, generated, arguments.options));
+  if (!arguments.quiet) print_rows(report.at("rows"));
+  if (!arguments.output.empty()) train::write_json(arguments.output, report);
+}
+
+struct SamplingArguments {
+  std::string run, population, sampler, body, output;
+  verify::SamplingErrorOptions options;
+  uint32_t threads = 1;
+};
+
+void run_sampling(const SamplingArguments& arguments) {
+  at::set_num_threads(static_cast<int>(arguments.threads));
+  const generate::TrainedSampler trained = generate::TrainedSampler::open(arguments.run, arguments.population);
+  const train::PackageFile sampler = train::open_package(arguments.sampler, PackageKind::kSampler);
+  const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
+  nlohmann::json report = head();
+  report["sampler_hash"] = format_hash(sampler.package.content_hash());
+  report.update(verify::measure_sampling_error(trained, sampler.package.sampler(), body.package, arguments.options));
+  if (!arguments.options.quiet) {
+    for (const nlohmann::json& row : report.at("rows")) {
+      std::printf("%-18s %-8s %4d evaluations: rms error %.3g, %.4f s", row.at("denoiser").get<std::string>().c_str(),
+                  row.at("solver").get<std::string>().c_str(), row.at("evaluations").get<int>(), number(row.at("rms_error")),
+                  number(row.at("seconds")));
+      if (row.contains("picture_db")) std::printf(", pictures %.1f dB", number(row.at("picture_db")));
+      std::printf("\n");
+    }
+    std::printf("orders: %s\n", report.at("order").dump().c_str());
+  }
+  if (!arguments.output.empty()) train::write_json(arguments.output, report);
+}
+
+}  // namespace
+
+void add_evaluate_generation_command(CLI::App& evaluate) {
+  auto arguments = std::make_shared<GenerationArguments>();
+  arguments->threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  CLI::App* command = evaluate.add_subcommand("generation", "Sampled people against held-out and training ones, and rows to be beaten");
+  command->add_option("--population", arguments->population, "Population that the samplers learnt from")->required();
+  command->add_option("--body", arguments->body, "Body that its members stand on")->required();
+  command->add_option("--run", arguments->runs, "NAME=RUN of figurine-train sampler; may be given several times");
+  command->add_option("--steps", arguments->draw.steps, "Evaluations of a sample (default 20)")
+      ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
+  command->add_option("--first-seed", arguments->draw.first_seed, "Of the samples, counted up (default 0)");
+  command->add_option("--rank", arguments->rank, "Of the Gaussian's basis (default 64)")->check(CLI::Range(1, 1024));
+  command->add_option("--replicates", arguments->options.replicates, "Of the bootstrap (default 1000)")->check(CLI::Range(10, 100000));
+  command->add_option("--seed", arguments->options.seed, "Of baselines and bootstrap (default 0)");
+  command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->add_flag("--quiet", arguments->quiet, "No progress, no table");
+  command->add_option("-o,--output", arguments->output, "Report to write, JSON");
+  command->callback([arguments] { run_generation(*arguments); });
+}
+
+void add_evaluate_sampling_command(CLI::App& evaluate) {
+  auto arguments = std::make_shared<SamplingArguments>();
+  CLI::App* command = evaluate.add_subcommand("sampling", "Error against evaluations: oracle, float network, and the device's integers");
+  command->add_option("--run", arguments->run, "Folder of figurine-train sampler")->required();
+  command->add_option("--population", arguments->population, "Where its population is now (default: where the run found it)");
+  command->add_option("--sampler", arguments->sampler, "The run's package")->required();
+  command->add_option("--body", arguments->body, "Body that its avatars stand on")->required();
+  command->add_option("--seeds", arguments->options.seeds, "Whose errors are pooled (default 4)")->check(CLI::Range(1, 1000));
+  command->add_option("--evaluations", arguments->options.evaluations, "Numbers to try")->check(CLI::Range(size_t{1}, kMaxSolverSteps));
+  command->add_option("--threads", arguments->threads, "Of the float network (default 1: seconds are one core's)")
+      ->check(CLI::Range(1, 256));
+  command->add_flag("--quiet", arguments->options.quiet, "No progress, no table");
+  command->add_option("-o,--output", arguments->output, "Report to write, JSON");
+  command->callback([arguments] { run_sampling(*arguments); });
+}
+
+}  // namespace figurine::cli

@@ -1,0 +1,258 @@
+#include "toolchain/evaluate/generation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "toolchain/error.h"
+#include "toolchain/evaluate/bootstrap.h"
+#include "toolchain/evaluate/compared_pictures.h"
+#include "toolchain/evaluate/generation_baselines.h"
+#include "toolchain/evaluate/novelty.h"
+#include "toolchain/evaluate/sample_metrics.h"
+#include "toolchain/evaluate/statistics.h"
+
+namespace figurine::evaluate {
+
+namespace {
+
+constexpr size_t kMostAveraged = 5;
+constexpr size_t kNoisedTried = 12;  // members that the level of noise is matched on
+
+nlohmann::json finite(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+
+using MemberPictures = std::vector<std::vector<Picture>>;  // [M] of kComparedShots
+
+// A person of standardised weights, drawn. All else is the first training member's, which the others share.
+std::vector<Picture> draw_row(const MemberSet& set, const RowVector& z) {
+  const OpenedMember like(set.population(), set.training.front());
+  const RowVector weights = set.standardisation.restore(z);
+  std::vector<float> storage(static_cast<size_t>(weights.size()));
+  return set.draw(with_weights(like.avatar, {weights.data(), storage.size()}, storage));
+}
+
+MemberPictures draw_rows(const MemberSet& set, const std::string& name, const RowMatrix& z) {
+  MemberPictures pictures(static_cast<size_t>(z.rows()));
+  set.crew.run("drawing " + name, pictures.size(), [&](size_t i) { pictures[i] = draw_row(set, z.row(static_cast<Eigen::Index>(i))); });
+  return pictures;
+}
+
+MemberPictures pictures_of(const MemberSet& set, const std::vector<size_t>& members) {
+  MemberPictures pictures;
+  for (const size_t member : members) pictures.push_back(set.pictures[member]);
+  return pictures;
+}
+
+// Mean squared errors of all pairs, over both foregrounds: [A,B].
+RowMatrix errors_between(const MemberSet& set, const std::string& what, const MemberPictures& a, const MemberPictures& b) {
+  MemberPictures all = a;
+  all.insert(all.end(), b.begin(), b.end());
+  const ComparedPictures compared(all);
+  RowMatrix mse(static_cast<Eigen::Index>(a.size()), static_cast<Eigen::Index>(b.size()));
+  set.crew.run("comparing " + what, a.size(), [&](size_t i) {
+    for (size_t j = 0; j < b.size(); ++j) {
+      mse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = compared.error(i, a.size() + j).mse();
+    }
+  });
+  return mse;
+}
+
+// The same of one set: symmetric, zeros on the diagonal.
+RowMatrix errors_within(const MemberSet& set, const std::string& what, const MemberPictures& a) {
+  const ComparedPictures compared(a);
+  RowMatrix mse = RowMatrix::Zero(static_cast<Eigen::Index>(a.size()), static_cast<Eigen::Index>(a.size()));
+  set.crew.run("comparing " + what, a.size(), [&](size_t i) {
+    for (size_t j = 0; j < a.size(); ++j) {
+      if (i != j) mse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = compared.error(i, j).mse();
+    }
+  });
+  return mse;
+}
+
+double sharpness(const MemberPictures& people) {
+  double energy = 0, pixels = 0;
+  for (const std::vector<Picture>& pictures : people) {
+    for (const Picture& picture : pictures) {
+      energy += high_pass(picture, picture).truth;
+      pixels += static_cast<double>(foreground_error(picture, picture).count) / 3;
+    }
+  }
+  return pixels > 0 ? energy / pixels : 0;
+}
+
+nlohmann::json to_json(const BootstrapInterval& interval) {
+  return {{"value", finite(interval.estimate)}, {"low", finite(interval.low)}, {"high", finite(interval.high)}};
+}
+
+nlohmann::json compare(RowMatrix to_references, RowMatrix samples, RowMatrix references, const GenerationOptions& options) {
+  const SampleComparison comparison({std::move(to_references), std::move(samples), std::move(references)});
+  const BootstrapOptions bootstrap{.replicates = options.replicates, .seed = options.seed};
+  const auto interval = [&](const auto& statistic) {
+    return bootstrap_interval(comparison.size(), comparison.size(), statistic, bootstrap);
+  };
+  const BootstrapInterval nna = interval([&](const Items& items) { return comparison.one_nna_percent(items); });
+  return {{"count", comparison.size()},
+          {"mmd_psnr_db", to_json(interval([&](const Items& items) { return comparison.mmd_psnr_db(items); }))},
+          {"coverage_percent", to_json(interval([&](const Items& items) { return comparison.coverage_percent(items); }))},
+          {"one_nna_percent", to_json(nna)},
+          {"one_nna_off_ideal", std::abs(nna.estimate - 50)}};
+}
+
+nlohmann::json describe(const Novelty& novelty) {
+  std::vector<double> distances;
+  for (const NearestMember& nearest : novelty.samples) distances.push_back(nearest.distance);
+  return {{"median_nearest", quantile(distances, 0.5)},
+          {"median_ratio", finite(novelty.median_ratio)},
+          {"copy_distance", novelty.copy_distance},
+          {"copy_share", novelty.copy_share},
+          {"members_met", novelty.members_met}};
+}
+
+nlohmann::json describe(const std::vector<BlendShare>& blends) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (const BlendShare& blend : blends) {
+    rows.push_back({{"members", blend.members}, {"median_residual", blend.median_residual}, {"explained_share", blend.explained_share}});
+  }
+  return rows;
+}
+
+// What every row is held against.
+struct References {
+  MemberPictures training, held_out;
+  RowMatrix training_mse, held_out_mse, training_distances;
+  double training_sharpness = 0;
+
+  explicit References(const MemberSet& set)
+      : training(pictures_of(set, set.training)),
+        held_out(pictures_of(set, set.held_out)),
+        training_mse(errors_within(set, "training members", training)),
+        held_out_mse(errors_within(set, "held-out members", held_out)),
+        training_distances(rms_distances(set.training_z, set.training_z, set.standardisation.varying())),
+        training_sharpness(sharpness(training)) {}
+};
+
+nlohmann::json audit(const MemberSet& set, const References& references, const RowMatrix& z, const MemberPictures& pictures,
+                     const RowMatrix& to_training_mse) {
+  const Novelty weights = measure_novelty(rms_distances(z, set.training_z, set.standardisation.varying()), references.training_distances);
+  const Novelty seen = measure_novelty(to_training_mse, references.training_mse);
+  nlohmann::json of_pictures = describe(seen);
+  of_pictures["median_nearest_db"] = finite(psnr_db(of_pictures.at("median_nearest").get<double>()));
+  of_pictures["copy_distance_db"] = finite(psnr_db(seen.copy_distance));
+  return {{"novelty", {{"weights", describe(weights)}, {"pictures", of_pictures}}},
+          {"blends", describe(measure_blends(z, set.training_z))},
+          {"highpass_ratio", sharpness(pictures) / references.training_sharpness}};
+}
+
+nlohmann::json evaluate_row(const MemberSet& set, const References& references, const Generated& generated,
+                            const GenerationOptions& options) {
+  const auto training = static_cast<Eigen::Index>(references.training.size()),
+             held_out = static_cast<Eigen::Index>(references.held_out.size());
+  const RowMatrix z = generated.z.topRows(std::max(training, std::min(held_out, generated.z.rows())));
+  const MemberPictures pictures = draw_rows(set, generated.name, z);
+  const RowMatrix to_training = errors_between(set, generated.name + ", training", pictures, references.training);
+  const RowMatrix to_held_out = errors_between(set, generated.name + ", held-out", pictures, references.held_out);
+  const RowMatrix within = errors_within(set, generated.name, pictures);
+  nlohmann::json row = audit(set, references, z, pictures, to_training);
+  row["name"] = generated.name;
+  row["samples"] = z.rows();
+  row["held_out"] = compare(to_held_out.topRows(held_out), within.topLeftCorner(held_out, held_out), references.held_out_mse, options);
+  row["train"] = compare(to_training.topRows(training), within.topLeftCorner(training, training), references.training_mse, options);
+  return row;
+}
+
+// Noise whose pictures are as far from their member as wanted: deviations double or halve until they enclose it, then bisect.
+double match_noise(const MemberSet& set, double wanted_db, uint64_t seed) {
+  const auto picture_db = [&](double deviation) {
+    const size_t tried = std::min(kNoisedTried, set.training.size());
+    std::vector<SquaredError> errors(tried);
+    set.crew.run("matching noise", tried, [&](size_t i) {
+      const RowMatrix noised = draw_noised_members(set.training_z.middleRows(static_cast<Eigen::Index>(i), 1), deviation,
+                                                   {.count = 1, .seed = seed, .first = i});
+      errors[i] = union_error(draw_row(set, noised.row(0)), set.pictures[set.training[i]]);
+    });
+    SquaredError sum;
+    for (const SquaredError& error : errors) sum.add(error);
+    return sum.psnr_db();
+  };
+  double low = 1e-3, high = 1;
+  for (int i = 0; i < 8; ++i) {
+    const double middle = std::sqrt(low * high);
+    (picture_db(middle) > wanted_db ? low : high) = middle;
+  }
+  return std::sqrt(low * high);
+}
+
+}  // namespace
+
+std::vector<Generated> make_baselines(const MemberSet& set, size_t rank, double noised_db, uint64_t seed) {
+  const size_t count = set.training.size();
+  const Draw draw{.count = count, .seed = seed};
+  std::vector<Generated> baselines;
+  RowMatrix gaussian = RowMatrix::Zero(static_cast<Eigen::Index>(count), set.training_z.cols());
+  uint64_t stream = seed;
+  for (const Token& token : set.standardisation.tokens()) {
+    const PrincipalBasis basis(set.training_z, token.begin, token.size);
+    const size_t kept = std::min(rank, basis.rank());
+    ++stream;  // tokens are drawn apart
+    if (kept == 0) continue;
+    const RowMatrix directions = basis.directions(kept);
+    const auto part = [&](const RowMatrix& rows) {
+      return rows.middleCols(static_cast<Eigen::Index>(token.begin), static_cast<Eigen::Index>(token.size));
+    };
+    const RowMatrix coordinates = part(set.training_z) * directions.transpose();
+    gaussian.middleCols(static_cast<Eigen::Index>(token.begin), static_cast<Eigen::Index>(token.size)) =
+        draw_independent_gaussian(coordinates, {.count = count, .seed = stream}) * directions;
+  }
+  baselines.push_back({"Gaussian in the basis, tokens apart", std::move(gaussian)});
+  baselines.push_back({"Gaussian of the members", draw_gaussian(set.training_z, draw)});
+  for (size_t m = 2; m <= std::min(kMostAveraged, count); ++m) {
+    baselines.push_back({"average of " + std::to_string(m) + " members", draw_averages(set.training_z, m, draw)});
+  }
+  baselines.push_back({"member + noise", draw_noised_members(set.training_z, match_noise(set, noised_db, seed), draw)});
+  baselines.push_back({"perfect memoriser", draw_members(set.training_z, draw)});
+  return baselines;
+}
+
+nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Generated>& generated, const GenerationOptions& options) {
+  if (set.held_out.size() < 2) throw InputError("population '" + set.population().name + "': has fewer than two held-out members");
+  const References references(set);
+  nlohmann::json rows = nlohmann::json::array();
+  for (const Generated& one : generated) {
+    if (one.z.rows() < static_cast<Eigen::Index>(set.training.size())) throw InputError(one.name + ": fewer samples than training members");
+    rows.push_back(evaluate_row(set, references, one, options));
+  }
+  const RowMatrix to_training = errors_between(set, "held-out members", references.held_out, references.training);
+  nlohmann::json held_out = audit(set, references, set.held_out_z, references.held_out, to_training);
+  held_out["name"] = "held-out members";
+  held_out["samples"] = set.held_out.size();
+  // Training members as if they had been sampled: what "within 1 dB of training members" is measured from.
+  const auto count = static_cast<Eigen::Index>(std::min(set.held_out.size(), set.training.size()));
+  const RowMatrix as_samples = to_training.transpose().topRows(count).leftCols(count);
+  nlohmann::json members{{"name", "training members"},
+                         {"samples", count},
+                         {"held_out", compare(as_samples, references.training_mse.topLeftCorner(count, count),
+                                              references.held_out_mse.topLeftCorner(count, count), options)}};
+  rows.push_back(std::move(members));
+  rows.push_back(std::move(held_out));
+  return {{"population", set.population().name},
+          {"population_hash", format_hash(set.package->content_hash())},
+          {"references",
+           {{"kind", "renders of trained avatars by the device's renderer, float"},
+            {"training", set.training.size()},
+            {"held_out", set.held_out.size()},
+            {"shots", kComparedShots},
+            {"picture_px", set.picture_px}}},
+          {"bootstrap", {{"replicates", options.replicates}, {"seed", options.seed}, {"confidence", 0.95}}},
+          {"rows", rows}};
+}
+
+double nearest_member_db(const MemberSet& set, const Generated& generated, size_t most) {
+  const RowMatrix z = generated.z.topRows(std::min(generated.z.rows(), static_cast<Eigen::Index>(most)));
+  const RowMatrix mse = errors_between(set, "nearest members", draw_rows(set, generated.name, z), pictures_of(set, set.training));
+  std::vector<double> nearest;
+  for (Eigen::Index i = 0; i < mse.rows(); ++i) nearest.push_back(mse.row(i).minCoeff());
+  return psnr_db(quantile(nearest, 0.5));
+}
+
+}  // namespace figurine::evaluate

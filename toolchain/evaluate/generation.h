@@ -1,0 +1,37 @@
+// How a generator's people compare with people that it has seen and with people that it has not (docs/numerics.md, "Generation"): MMD, COV
+// and 1-NNA of pictures, the novelty audit in weights and in pictures, and sharpness, for trained samplers and for the rows that they have
+// to beat. Pictures are the device renderer's in a population's common poses and views; references are renders of trained avatars.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "toolchain/evaluate/member_set.h"
+
+namespace figurine::evaluate {
+
+// People to be judged. A sampler's, or a baseline's.
+struct Generated {
+  std::string name;
+  RowMatrix z;  // [S,D] standardised weights, S >= N of the training part
+};
+
+// The rows that need no training: a Gaussian in every token's `rank` principal directions, averages of 2 to 5 members, the perfect
+// memoriser, and training members with noise whose pictures are as far from their member as `noised_db` says. [N,D] each.
+std::vector<Generated> make_baselines(const MemberSet& set, size_t rank, double noised_db, uint64_t seed);
+
+struct GenerationOptions {
+  size_t replicates = 1000;  // of the bootstrap
+  uint64_t seed = 0;
+};
+
+// "references": what the sets are; "rows": one for each of the generated, and one of the held-out members themselves for the audit and
+// sharpness. Throws InputError if there are no held-out members, or Interrupted.
+nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Generated>& generated, const GenerationOptions& options);
+
+// Median PSNR of rows' pictures to the nearest training member's: what `noised_db` is matched to.
+double nearest_member_db(const MemberSet& set, const Generated& generated, size_t most = 50);
+
+}  // namespace figurine::evaluate
