@@ -16,6 +16,7 @@ struct Command {
   std::function<Status()> run;
 };
 
+Command add_sample_command(CLI::App& app);
 Command add_render_command(CLI::App& app);
 Command add_splat_command(CLI::App& app);
 Command add_export_command(CLI::App& app);

@@ -23,7 +23,9 @@ std::vector<std::string> packages_in(const std::string& folder) {
   return paths;
 }
 
-Result<std::unique_ptr<LoadedPackage>> open_any(const std::string& path) {
+}  // namespace
+
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path) {
   Result<ports::MappedFile> file = ports::MappedFile::open(path);
   if (!file.ok()) return file.status();
   Result<Package> package = Package::open(file->bytes(), path);
@@ -31,10 +33,8 @@ Result<std::unique_ptr<LoadedPackage>> open_any(const std::string& path) {
   return std::make_unique<LoadedPackage>(LoadedPackage{path, std::move(*file), std::move(*package)});
 }
 
-}  // namespace
-
 Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted) {
-  Result<std::unique_ptr<LoadedPackage>> loaded = open_any(path);
+  Result<std::unique_ptr<LoadedPackage>> loaded = load_package(path);
   if (loaded.ok() && (*loaded)->package.kind() != wanted) {
     return Status(StatusCode::kInvalidArgument,
                   path + ": kind: is a package of kind " + to_string((*loaded)->package.kind()) + ", not " + to_string(wanted));
@@ -73,7 +73,7 @@ Status open_population_member(const Population& population, const std::string& p
 
 Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name) {
   const auto [path, member] = split_member(name);
-  Result<std::unique_ptr<LoadedPackage>> package = open_any(path);
+  Result<std::unique_ptr<LoadedPackage>> package = load_package(path);
   if (!package.ok()) return package.status();
   auto loaded = std::make_unique<LoadedAvatar>(LoadedAvatar{name, std::move(*package), {}, {}});
   const Package& opened = loaded->package->package;
@@ -85,6 +85,9 @@ Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name) {
     return Status(StatusCode::kInvalidArgument,
                   path + ": member '" + *member + "': a package of kind " + to_string(opened.kind()) + " has no members, a population has");
   }
+  if (opened.kind() == PackageKind::kSampler) {
+    return Status(StatusCode::kInvalidArgument, path + ": kind: is a sampler: figurine sample makes an avatar of it");
+  }
   if (opened.kind() != PackageKind::kAvatar) {
     return Status(StatusCode::kInvalidArgument, path + ": kind: is a package of kind " + to_string(opened.kind()) + ", not avatar");
   }
@@ -93,15 +96,19 @@ Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name) {
 }
 
 Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar, const std::string& body_option) {
-  const Avatar& wanted = avatar.avatar;
+  return find_body(avatar.avatar, avatar.name, avatar.package->path, body_option);
+}
+
+Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& wanted, const std::string& name, const std::string& beside,
+                                                 const std::string& body_option) {
   if (!body_option.empty()) {
     Result<std::unique_ptr<LoadedPackage>> body = load_package(body_option, PackageKind::kBody);
     if (!body.ok()) return body;
     const Status fits = check_avatar_fits_body(wanted, (*body)->package);
-    if (!fits.ok()) return fits.within(avatar.name + " on " + body_option);
+    if (!fits.ok()) return fits.within(name + " on " + body_option);
     return body;
   }
-  const std::filesystem::path folder = std::filesystem::path(avatar.package->path).parent_path();
+  const std::filesystem::path folder = std::filesystem::path(beside).parent_path();
   std::vector<std::string> folders = {folder.empty() ? "." : folder.string()};
   if (const char* search = std::getenv("FIGURINE_PATH"); search != nullptr) {
     std::istringstream list(search);
@@ -113,18 +120,18 @@ Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar, con
   for (const std::string& place : folders) {
     looked_in += (looked_in.empty() ? "" : ", ") + place;
     for (const std::string& path : packages_in(place)) {
-      Result<std::unique_ptr<LoadedPackage>> candidate = open_any(path);
+      Result<std::unique_ptr<LoadedPackage>> candidate = load_package(path);
       if (!candidate.ok() || (*candidate)->package.kind() != PackageKind::kBody) continue;
       if ((*candidate)->package.content_hash() == wanted.body_hash) {
         const Status fits = check_avatar_fits_body(wanted, (*candidate)->package);
-        if (!fits.ok()) return fits.within(avatar.name + " on " + path);
+        if (!fits.ok()) return fits.within(name + " on " + path);
         return candidate;
       }
       others += (others.empty() ? "" : ", ") + path + " is " + format_hash((*candidate)->package.content_hash());
     }
   }
   return Status(others.empty() ? StatusCode::kNotFound : StatusCode::kMismatch,
-                avatar.name + ": body: needs " + format_hash(wanted.body_hash) + " (" + wanted.body_name + "); looked in " + looked_in +
+                name + ": body: needs " + format_hash(wanted.body_hash) + " (" + wanted.body_name + "); looked in " + looked_in +
                     (others.empty() ? "; no body there" : "; found others: " + others));
 }
 

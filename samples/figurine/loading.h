@@ -21,6 +21,9 @@ struct LoadedPackage {
 // kNotFound, kCorrupt... as the file and the reader say; kInvalidArgument names both kinds if it is another one than wanted.
 Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted);
 
+// Of any kind.
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path);
+
 // An avatar from a package of its own, or a member of a population.
 struct LoadedAvatar {
   std::string name;                        // as it was asked for: "person.fgn", "people.fgn#17"
@@ -37,5 +40,8 @@ Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name);
 // of the folders in FIGURINE_PATH (colon-separated). Found by content hash, whatever the file is called. Errors name the hash that is
 // wanted and the hashes that were found.
 Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar, const std::string& body_option);
+// The same of an avatar that is no file yet: name is what messages call it, beside the path of what it was made from.
+Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& avatar, const std::string& name, const std::string& beside,
+                                                 const std::string& body_option);
 
 }  // namespace figurine::samples

@@ -1,15 +1,12 @@
-// figurine report: every speed-up as a point of error over run time. One table of dials; each setting is rendered for the same frames in
-// turn and held against the reference setting's pictures.
+// figurine report: every speed-up as a point of error over run time, of avatars here and of samplers in sampler_report.cpp. One table of
+// dials; each setting is rendered for the same frames in turn and held against the reference setting's pictures.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <system_error>
 
-#include "ports/linux/files.h"
 #include "ports/linux/png.h"
 #include "samples/figurine/cast.h"
 #include "samples/figurine/commands.h"
@@ -17,10 +14,13 @@
 #include "samples/figurine/frame_log.h"
 #include "samples/figurine/frame_sink.h"
 #include "samples/figurine/image_error.h"
+#include "samples/figurine/loading.h"
 #include "samples/figurine/machine.h"
 #include "samples/figurine/progress.h"
+#include "samples/figurine/report_files.h"
 #include "samples/figurine/report_page.h"
 #include "samples/figurine/rig.h"
+#include "samples/figurine/sampler_report.h"
 
 namespace figurine::samples {
 
@@ -107,6 +107,7 @@ struct ReportOptions {
   DeviceOptions device;
   std::string size, output;
   uint32_t frames = 16;
+  uint32_t seeds = 4;
 };
 
 struct Measurement {
@@ -261,19 +262,12 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
   return json;
 }
 
-// Both files or none: the second is written only if the first could be, and takes it along if it fails.
-Status write_report(const std::string& folder, const nlohmann::ordered_json& json, const std::string& html) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return Status(StatusCode::kIo, folder + ": cannot be made: " + error.message());
-  const std::string text = json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-  FIG_RETURN_IF_ERROR(ports::write_file_atomically(folder + "/report.json", std::as_bytes(std::span(text))));
-  const Status status = ports::write_file_atomically(folder + "/report.html", std::as_bytes(std::span(html)));
-  if (!status.ok()) std::filesystem::remove(folder + "/report.json", error);
-  return status;
-}
-
 Status run_report(const ReportOptions& options) {
+  // Whatever else it is, or is not, is said by what loads an avatar.
+  if (const auto loaded = load_package(options.cast.avatars[0]); loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
+    return run_sampler_report(**loaded,
+                              {.body = options.cast.body, .seeds = options.seeds, .output = options.output, .json = options.device.json});
+  }
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
   RigOptions rig;
@@ -349,13 +343,16 @@ Command add_report_command(CLI::App& app) {
   options->cast.avatars.resize(1);
   command
       ->add_option("avatar", options->cast.avatars[0],
-                   "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+                   "avatar or sampler package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
       ->required();
   command->add_option("--body", options->cast.body,
                       "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
   command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose, swaying")->expected(1);
   command->add_option("--frames", options->frames, "measured frames, evenly over the motion")
       ->check(CLI::Range(1u, 10000u))
+      ->capture_default_str();
+  command->add_option("--seeds", options->seeds, "of a sampler: people whose errors are pooled")
+      ->check(CLI::Range(1u, 1000u))
       ->capture_default_str();
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the golden frame's");
   command->add_option("-o,--output", options->output, "folder for report.json and report.html")->required();

@@ -75,13 +75,17 @@ std::string capitalised(std::string text) {
 
 std::string cell(const std::string& text) { return "<td>" + text + "</td>"; }
 
+// A dial of the renderer counts the blends of frames, one of a sampler the evaluations of its denoiser.
+bool blends_are_counted(const Json& dial) { return dial["settings"][0]["work"].contains("blends"); }
+
 std::string plots_of(const Json& dial) {
   // Without an order between the settings there is no curve to draw; the table says all.
   if (dial["theoretical_order"].is_null()) return "<p class=\"words\">" + escape_html(dial["theory"].get<std::string>()) + "</p>\n";
   std::string stages;
   for (const Json& stage : dial["stages"]) stages += (stages.empty() ? "" : ", ") + stage.get<std::string>();
   Plot time{.x = {"median time of " + stages + ", ms"}, .y = {"PSNR to the reference, dB"}};
-  Plot work{.x = {"blends a frame", true}, .y = {"PSNR to the reference, dB"}};
+  const bool of_frames = blends_are_counted(dial);
+  Plot work{.x = {of_frames ? "blends a frame" : "multiply-accumulates", true}, .y = {"PSNR to the reference, dB"}};
   Plot order{.x = {dial["name"].get<std::string>(), true}, .y = {"rms error", true}};
   for (const Json& setting : dial["settings"]) {
     if (setting["psnr_db"].is_null()) continue;  // no error at all has no place on a scale of decibels
@@ -89,7 +93,7 @@ std::string plots_of(const Json& dial) {
     const bool is_default = setting["default"];
     const double psnr = setting["psnr_db"];
     time.points.push_back({setting["cost_ms"]["median"], psnr, label, is_default});
-    work.points.push_back({setting["work"]["blends"], psnr, label, is_default});
+    work.points.push_back({setting["work"][of_frames ? "blends" : "macs"], psnr, label, is_default});
     order.points.push_back({setting["value"], setting["rmse"], label, is_default});
     if (is_default && dial["theoretical_order"].get<double>() > 0) {
       const double p = dial["theoretical_order"], v = setting["value"], e = setting["rmse"];
@@ -103,7 +107,7 @@ std::string plots_of(const Json& dial) {
          figure(
              time,
              "Error over the time of the stages that the dial touches: up and to the left is better. Times move with the machine's mood.") +
-         figure(work, "Error over work: blends do not depend on the machine.") +
+         figure(work, std::string("Error over work: ") + (of_frames ? "blends" : "operations") + " do not depend on the machine.") +
          figure(order, "Convergence: the slope is the observed order; dashed, the theoretical one through the default.") +
          "<div class=\"words\"><p><b>In theory.</b> " + escape_html(dial["theory"].get<std::string>()) + " Order " +
          format("%g", dial["theoretical_order"]) + ".</p><p><b>Observed.</b> " +
@@ -113,12 +117,12 @@ std::string plots_of(const Json& dial) {
 }
 
 std::string table_of(const Json& dial) {
+  const bool of_frames = blends_are_counted(dial);
   std::string html =
       "<table><tr><th>" + escape_html(dial["name"].get<std::string>()) +
-      "</th><th>PSNR, dB</th><th>rms error</th><th>largest</th><th>observed order</th><th>its stages, ms</th><th>p90, ms</th>"
-      "<th>whole frame, ms</th><th>blends</th><th>pairs</th><th>GMAC</th></tr>\n";
+      "</th><th>PSNR, dB</th><th>rms error</th><th>largest</th><th>observed order</th><th>its stages, ms</th><th>p90, ms</th>" +
+      (of_frames ? "<th>whole frame, ms</th><th>blends</th><th>pairs</th>" : "") + "<th>GMAC</th></tr>\n";
   for (const Json& setting : dial["settings"]) {
-    const Json& total = setting["stages_ms"]["total"];
     const Json& work = setting["work"];
     html += setting["default"].get<bool>() ? "<tr class=\"default\">" : "<tr>";
     html += cell(escape_html(setting["label"].get<std::string>()) + (setting["default"].get<bool>() ? " (default)" : ""));
@@ -126,9 +130,12 @@ std::string table_of(const Json& dial) {
     html += cell(format("%.2e", setting["rmse"])) + cell(format("%.2e", setting["largest"]));
     html += cell(setting["observed_order"].is_null() ? "" : format("%.2f", setting["observed_order"]));
     const Json& cost = setting["cost_ms"];
-    html += cell(format("%.2f", cost["median"])) + cell(format("%.2f", cost["p90"])) + cell(format("%.2f", total["median"]));
-    html += cell(format("%.0f", work["blends"])) + cell(format("%.0f", work["pairs"])) +
-            cell(format("%.3f", work["macs"].get<double>() * 1e-9));
+    html += cell(format("%.2f", cost["median"])) + cell(format("%.2f", cost["p90"]));
+    if (of_frames) {
+      html += cell(format("%.2f", setting["stages_ms"]["total"]["median"]));
+      html += cell(format("%.0f", work["blends"])) + cell(format("%.0f", work["pairs"]));
+    }
+    html += cell(format("%.3f", work["macs"].get<double>() * 1e-9));
     html += "</tr>\n";
   }
   return html + "</table>\n";
@@ -138,16 +145,22 @@ std::string table_of(const Json& dial) {
 
 std::string report_html(const Json& report, const std::vector<ReportPicture>& pictures) {
   const Json& machine = report["machine"];
+  const bool of_sampler = report.contains("sampler");
   const auto text = [](const Json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); };
   std::string html =
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">";
   html += "<title>figurine: error against run time</title><style>" + std::string(kStyle) + "</style></head><body>\n";
-  html +=
-      "<h1>Error against run time</h1>\n<p class=\"soft\">What each dial of the renderer costs in quality and saves in time, for one "
-      "avatar.</p>\n";
-  html += "<dl class=\"facts\">\n" + fact("Avatar", text(report["avatar"]));
-  html += fact("Motion", report["motion"].is_null() ? "golden pose, swaying" : text(report["motion"]));
-  html += fact("Frames", text(report["frames"]) + " of " + text(report["size"][0]) + " x " + text(report["size"][1]));
+  html += "<h1>Error against run time</h1>\n<p class=\"soft\">What each dial of the " + std::string(of_sampler ? "sampler" : "renderer") +
+          " costs in quality and saves in time, for one " + (of_sampler ? "package" : "avatar") + ".</p>\n";
+  html += "<dl class=\"facts\">\n";
+  const std::string size = text(report["size"][0]) + " x " + text(report["size"][1]);
+  if (of_sampler) {
+    html += fact("Sampler", text(report["sampler"])) + fact("People", text(report["seeds"]) + " seeds, pictures of " + size);
+  } else {
+    html += fact("Avatar", text(report["avatar"]));
+    html += fact("Motion", report["motion"].is_null() ? "golden pose, swaying" : text(report["motion"]));
+    html += fact("Frames", text(report["frames"]) + " of " + size);
+  }
   html += fact("CPU", text(machine["cpu"])) + fact("Threads", text(machine["threads"]) + " on " + text(machine["cpus"]) + " CPUs");
   html += fact("Arithmetic", text(machine["precision"]) + ", " + text(machine["isa"]) + " kernels");
   html += fact("Made", text(report["date"])) + fact("By", "figurine " + text(report["version"])) + "</dl>\n";
@@ -157,7 +170,9 @@ std::string report_html(const Json& report, const std::vector<ReportPicture>& pi
     html += plots_of(dial) + table_of(dial);
   }
   if (!pictures.empty()) {
-    html += "<h2>Where the error is</h2>\n<p>The middle frame. Differences are shown around mid-grey.</p>\n<div class=\"pictures\">\n";
+    html += "<h2>Where the error is</h2>\n<p>" +
+            std::string(of_sampler ? "One person, as it becomes one." : "The middle frame. Differences are shown around mid-grey.") +
+            "</p>\n<div class=\"pictures\">\n";
     for (const ReportPicture& picture : pictures) {
       html += "<figure><img alt=\"" + escape_html(picture.caption) + "\" src=\"data:image/png;base64," + base64(picture.png) +
               "\"><figcaption>" + escape_html(picture.caption) + "</figcaption></figure>\n";

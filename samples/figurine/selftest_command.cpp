@@ -1,5 +1,6 @@
 // figurine selftest: draws the package's golden frame on this device and compares it: in float with the picture that the trainer's renderer
-// made of it, in fixed point with the hash that it has on every device.
+// made of it, in fixed point with the hash that it has on every device. Of a sampler: samples its golden seeds and compares the weights'
+// hashes.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -9,12 +10,16 @@
 #include <optional>
 #include <vector>
 
+#include "figurine/avatar_sampler.h"
 #include "ports/linux/png.h"
 #include "samples/figurine/cast.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/device_options.h"
 #include "samples/figurine/frame_sink.h"
 #include "samples/figurine/image_error.h"
+#include "samples/figurine/loading.h"
+#include "samples/figurine/machine.h"
+#include "samples/figurine/progress.h"
 
 namespace figurine::samples {
 
@@ -144,7 +149,49 @@ Result<std::vector<Verdict>> judge(const SelftestOptions& options, const Rendere
   return verdicts;
 }
 
+Status run_sampler_selftest(const Package& package, const std::string& path, bool as_json) {
+  const Sampler& sampler = package.sampler();
+  if (sampler.golden_seeds.empty()) return Status(StatusCode::kNotFound, path + ": golden seeds: the package has none to compare with");
+  const Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler);
+  if (!device.ok()) return device.status().within(path);
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  std::string reason;
+  SampledAvatar person;
+  Progress progress("selftest", sampler.golden_seeds.size());
+  for (const GoldenSeed& golden : sampler.golden_seeds) {
+    FIG_RETURN_IF_ERROR(check_interrupt());
+    FIG_RETURN_IF_ERROR((*device)->sample({.seed = golden.seed, .steps = golden.steps, .method = golden.method}, person).within(path));
+    const std::string here = format_hash(hash_weights(person.avatar().fixed_point, person.avatar().shape)),
+                      there = format_hash(golden.hash);
+    const std::string seed = std::format("seed {} in {} steps of {}", golden.seed, golden.steps, to_string(golden.method));
+    if (here != there && reason.empty()) reason = std::format("{}: this device's weights are {}, the package's {}", seed, here, there);
+    rows.push_back({{"seed", golden.seed},
+                    {"steps", golden.steps},
+                    {"solver", to_string(golden.method)},
+                    {"passed", here == there},
+                    {"hash", here},
+                    {"golden_hash", there}});
+    if (!as_json) {
+      std::printf("%s: %s %s: %s\n", path.c_str(), seed.c_str(), here == there ? "agrees to the bit" : "DIFFERS", here.c_str());
+    }
+    progress.update(rows.size());
+  }
+  if (as_json) {
+    nlohmann::ordered_json json = json_header("selftest");
+    json["sampler"] = path;
+    json["passed"] = reason.empty();
+    json["golden_seeds"] = rows;
+    json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", usable_cpus()}, {"threads", 1}};
+    print_json(json);
+  }
+  return reason.empty() ? Status() : Status(StatusCode::kMismatch, path + ": golden seeds: " + reason);
+}
+
 Status run_selftest(const SelftestOptions& options) {
+  // Whatever else it is, or is not, is said by what loads an avatar.
+  if (const auto loaded = load_package(options.cast.avatars[0]); loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
+    return run_sampler_selftest((*loaded)->package, options.cast.avatars[0], options.device.json);
+  }
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
   const std::string& path = options.cast.avatars[0];
@@ -170,11 +217,12 @@ Status run_selftest(const SelftestOptions& options) {
 
 Command add_selftest_command(CLI::App& app) {
   auto options = std::make_shared<SelftestOptions>();
-  CLI::App* command = app.add_subcommand("selftest", "Compares this device's picture of the golden frame with the package's");
+  CLI::App* command = app.add_subcommand(
+      "selftest", "Compares what this device makes of the golden frame, or of a sampler's golden seeds, with the package's");
   options->cast.avatars.resize(1);
   command
       ->add_option("avatar", options->cast.avatars[0],
-                   "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+                   "avatar or sampler package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
       ->required();
   command->add_option("--body", options->cast.body,
                       "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");

@@ -20,7 +20,7 @@ class RandomSampler {
  public:
   explicit RandomSampler(const RandomSamplerShape& shape = {}, uint64_t seed = 1) {
     view.name = "random";
-    view.network = make_pose_unet(shape.uv_size, 6, shape.channels, head_channels(0));
+    view.network = make_pose_unet(shape.uv_size, kMapChannels, shape.channels, head_channels(0));
     view.shape_count = shape.shape_count;
     view.values.assign(view.network.layers.size(), {.scale = 0.05f, .zero_point = -128});
     view.values[0] = {.scale = 1e-4f, .zero_point = 0};

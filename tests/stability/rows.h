@@ -33,5 +33,6 @@ std::span<const Case> pose_cases();
 std::span<const Case> package_cases();
 std::span<const Case> fixed_point_cases();
 std::span<const Case> sampling_cases();
+std::span<const Case> sampler_cases();
 
 }  // namespace figurine::stability

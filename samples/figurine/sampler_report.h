@@ -1,0 +1,20 @@
+// figurine report of a sampler: what the number of evaluations costs, and what it buys in pictures of the sampled people.
+#pragma once
+
+#include <string>
+
+#include "figurine/status.h"
+#include "samples/figurine/loading.h"
+
+namespace figurine::samples {
+
+struct SamplerReportOptions {
+  std::string body;    // empty: found by content hash
+  uint32_t seeds = 4;  // 0, 1, ...: people whose errors are pooled
+  std::string output;  // folder for report.json and report.html
+  bool json = false;
+};
+
+Status run_sampler_report(const LoadedPackage& sampler, const SamplerReportOptions& options);
+
+}  // namespace figurine::samples
