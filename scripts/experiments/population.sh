@@ -26,6 +26,6 @@ scripts/run python3 scripts/experiments/population_report.py "$state" "$name" do
 worst=()
 while read -r identity; do worst+=(-i "$state/members/$identity.jpg"); done < "$state/worst.txt"
 scripts/run ffmpeg -v error -y "${worst[@]}" -filter_complex \
-  "$(for k in $(seq 0 9); do printf '[%d]scale=-2:320,pad=700:320:0:0:0x808080,setsar=1[t%d];' "$k" "$k"; done)$(printf '[t%d]' $(seq 0 9))xstack=inputs=10:layout=$(
-    for k in $(seq 0 9); do printf '%d_%d%s' $((k % 2 * 700)) $((k / 2 * 320)) "$([ "$k" = 9 ] || printf '|')"; done)" \
+  "$(for k in $(seq 0 9); do printf '[%d]scale=480:320:force_original_aspect_ratio=decrease,pad=480:320:0:0:0x808080,setsar=1[t%d];' "$k" "$k"; done)$(printf '[t%d]' $(seq 0 9))xstack=inputs=10:layout=$(
+    for k in $(seq 0 9); do printf '%d_%d%s' $((k % 2 * 480)) $((k / 2 * 320)) "$([ "$k" = 9 ] || printf '|')"; done)" \
   -q:v 4 "docs/population_worst_$name.jpg"
