@@ -19,6 +19,12 @@ target_include_directories(figurine_formats PRIVATE "${PROJECT_SOURCE_DIR}")
 # Both libraries are used by their headers alone: nothing to link, nothing to ship.
 target_include_directories(figurine_formats SYSTEM PRIVATE "${CMAKE_CURRENT_BINARY_DIR}/schema" ${XXHASH_INCLUDE_DIRS})
 target_compile_options(figurine_formats PRIVATE -fno-exceptions)
+if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
+  # A package is opened once: of its reader, size is what a device pays for. Checksums read every byte of it and stay fast.
+  get_target_property(reader figurine_formats SOURCES)
+  list(FILTER reader INCLUDE REGEX "package")
+  set_source_files_properties(${reader} PROPERTIES COMPILE_OPTIONS -Os)
+endif()
 
 add_library(figurine_writer STATIC writer/package_assemble.cpp writer/package_parts.cpp writer/package_writer.cpp writer/population_writer.cpp writer/rans_encoder.cpp
   writer/sampler_writer.cpp)
