@@ -26,6 +26,7 @@ Provenance make_provenance(const PackSamplerOptions& options, const TrainedSampl
   for (const char* key : {"command", "commit"}) provenance.settings.push_back({key, json.value(key, "")});
   const nlohmann::json settings = to_json(trained.settings);
   for (const auto& [key, value] : settings.items()) {
+    if (key == "iterations" || key == "seconds") continue;  // the budget; what was done is told below
     if (!value.is_structured()) provenance.settings.push_back({key, value.is_string() ? value.get<std::string>() : value.dump()});
   }
   for (const char* key : {"training_members", "dimension", "iterations", "train_seconds", "loss", "validation_loss"}) {
