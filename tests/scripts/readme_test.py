@@ -19,6 +19,7 @@ TOOLS = {}
 SMALLER = [(r"--preset edge", "--preset nano"), (r"--uv 128", "--uv 32"), (r"--minutes \d+", "--iterations 20"), (r"--size 512x512", "--size 64x64"),
            (r"(figurine-train capture.*)", r"\1 --views 6 --frames 10 --size 64x64"),
            (r"(figurine-train body.*)", r"\1 --shape-samples 30"), (r"(figurine bench.*)", r"\1 --frames 3"), (r"(figurine report.*)", r"\1 --frames 2"),
+           (r"(figurine report samples/samplers.*)", r"\1 --seeds 1"),
            (r"(figurine render .*)(-o out/walk)", r"\1--frames 0:4 \2"), (r"(evaluate parity.*)", r"\1 --views 2")]
 
 
@@ -41,7 +42,7 @@ def help_of(words):
 class Readme(unittest.TestCase):
     def test_shows_every_tool_and_both_commands(self):
         shown = "\n".join(commands())
-        for words in ["scripts/demo", "scripts/test", "figurine-inspect", *(f"figurine {name}" for name in "render splat export bench report selftest".split()),
+        for words in ["scripts/demo", "scripts/test", "figurine-inspect", *(f"figurine {name}" for name in "sample render splat export bench report selftest".split()),
                       *(f"figurine-train {name}" for name in "body motion capture avatar pack evaluate".split())]:
             self.assertIn(words, shown)
 
