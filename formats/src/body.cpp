@@ -48,6 +48,7 @@ void draw_pose_maps(const Body& body, const PoseView& pose, const MapStatistics&
 }
 
 void draw_fourier_channels(uint32_t uv_size, uint32_t octaves, uint32_t first, uint32_t stride, std::span<float> maps) {
+  if (octaves == 0) return;  // no channel, and maybe no memory to draw it in
   FIG_CHECK(first + 4 * octaves <= stride && maps.size() >= size_t(uv_size) * uv_size * stride, "map size");
   constexpr double kPi = 3.14159265358979323846;
   for (uint32_t v = 0; v < uv_size; ++v) {
