@@ -35,8 +35,9 @@ void run(SamplerArguments arguments) {
   if (arguments.iterations) settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
   if (arguments.minutes) settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};
   request.command = train::current_command();
+  request.place = generate::rank_place_from_environment();
   const generate::SamplerResult result = generate::train_sampler(request);
-  if (request.quiet) return;
+  if (request.quiet || request.place.rank > 0) return;
   std::printf("%s: %s%llu iterations in %.0f s, loss %.5f", request.run.c_str(), result.was_finished ? "was finished: " : "",
               static_cast<unsigned long long>(result.iteration), result.seconds, result.loss);
   if (std::isfinite(result.validation_loss)) std::printf(", validation %.5f", result.validation_loss);
@@ -81,6 +82,10 @@ void add_sampler_command(CLI::App& app) {
   CLI::Option* iterations =
       command->add_option("--iterations", arguments->iterations, "Budget (default 10000)")->check(CLI::PositiveNumber);
   command->add_option("--minutes", arguments->minutes, "Budget in minutes of training")->check(CLI::PositiveNumber)->excludes(iterations);
+  command
+      ->add_option("--rank-timeout", request.rank_timeout_s,
+                   "Seconds that ranks wait for each other at most, under srun or WORLD_SIZE (default 600)")
+      ->check(CLI::Range(1.0, 1e6));
   command->add_flag("--resume", request.resume, "Go on from the run's checkpoint, by the run's own settings");
   command->add_flag("--quiet", request.quiet, "No progress, no summary");
   command->callback([arguments] { run(*arguments); });

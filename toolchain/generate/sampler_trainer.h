@@ -3,7 +3,7 @@
 // Every iteration draws a batch of members, a noise level for each (stratified over the schedule, so that a batch sees all of it) and
 // standard normal noise: z = alpha x + sigma eps; the loss is the mean square of what is predicted less x (the paper's MSE on clean
 // weights). The moving average of the weights is what is kept. Everything that is drawn is a function of (seed, iteration, place in the
-// batch), so a resumed run draws what an uninterrupted one draws, and ranks of a cluster share a batch without a word.
+// batch), so a resumed run draws what an uninterrupted one draws, and ranks of a cluster share a batch without a word (flat_trainer.h).
 //
 //   RUN/run.json                 command, settings, population (its content hash), machine; when done also iterations and seconds
 //   RUN/log.csv                  iteration, seconds, learning rate, loss, loss of the validation members (empty if there are none)
@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "toolchain/generate/process_group.h"
 #include "toolchain/generate/sampler_settings.h"
 #include "toolchain/train/package_file.h"
 
@@ -32,6 +33,8 @@ struct SamplerRequest {
   bool quiet = false;
   double checkpoint_period_s = 60;
   uint64_t stop_after = 0;  // interrupt before this iteration, as Ctrl-C would; 0: never (tests)
+  RankPlace place;          // of many ranks all ask for the same, but for the run's folder and the threads: rank 0's run counts
+  double rank_timeout_s = 600;
 };
 
 struct SamplerResult {
@@ -40,9 +43,10 @@ struct SamplerResult {
   double loss = 0;             // mean over the last iterations
   double validation_loss = 0;  // of the moving average; NaN without validation members
   bool was_finished = false;
+  uint64_t weights_hash = 0;  // of the denoiser's own weights, not their average: the same on every rank
 };
 
-// Throws InputError or train::Interrupted (state saved).
+// Throws InputError, PeerLost (state saved, if there was any) or train::Interrupted (state saved).
 SamplerResult train_sampler(const SamplerRequest& request);
 
 // The rows of a population's weights that belong to one part, in its order: [M,W]. At most `most` of them, 0: all.
