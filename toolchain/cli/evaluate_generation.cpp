@@ -14,6 +14,7 @@
 #include "toolchain/generate/sampler_trainer.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
+#include "toolchain/train/threads.h"
 #include "toolchain/verify/float_sampler.h"
 #include "toolchain/verify/sampling_error.h"
 
@@ -70,7 +71,7 @@ std::pair<std::string, std::string> named_run(const std::string& text) {
 }
 
 void run_generation(const GenerationArguments& arguments) {
-  at::set_num_threads(static_cast<int>(arguments.threads));
+  train::use_threads(arguments.threads);
   const train::PackageFile population = train::open_package(arguments.population, PackageKind::kPopulation);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   const evaluate::MemberSet set(population.package, body.package, {.threads = arguments.threads, .quiet = arguments.quiet});
@@ -111,7 +112,7 @@ struct SamplingArguments {
 };
 
 void run_sampling(const SamplingArguments& arguments) {
-  at::set_num_threads(static_cast<int>(arguments.threads));
+  train::use_threads(arguments.threads);
   const generate::TrainedSampler trained = generate::TrainedSampler::open(arguments.run, arguments.population);
   const train::PackageFile sampler = train::open_package(arguments.sampler, PackageKind::kSampler);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);

@@ -55,7 +55,7 @@ void add_sampler_command(CLI::App& app) {
   command->add_option("--population", request.population, "Package to learn from: its training part alone")->required();
   command->add_option("-o,--output", request.run, "Folder of the run")->required();
   command->add_option("--variant", arguments->variant, "What a token is (default basis: principal directions of a layer)")
-      ->check(CLI::IsMember({"layer", "flat", "basis"}));
+      ->check(CLI::IsMember({"layer", "flat", "latent", "basis"}));
   command->add_option("--size", arguments->size, "Of the transformer (default device; paper: d_model 512, feed-forward 2048)")
       ->check(CLI::IsMember({"small", "device", "paper"}));
   command->add_option("--d-model", arguments->d_model, "Width of a token; a multiple of twice the heads")->check(CLI::Range(1, 1 << 14));
@@ -64,6 +64,15 @@ void add_sampler_command(CLI::App& app) {
   command->add_option("--feed-forward", arguments->feed_forward, "Width of the feed-forward layers")->check(CLI::Range(1, 1 << 16));
   command->add_option("--rank", settings.space.rank, "Variant basis: most directions of a token (default 64)")->check(CLI::Range(1, 1024));
   command->add_option("--chunk", settings.space.chunk, "Variant flat: values of a token (default 4096)")->check(CLI::Range(1, 1 << 20));
+  command
+      ->add_option("--latent-channels", settings.autoencoder.channels, "Variant latent: of the map that the autoencoder makes (default 4)")
+      ->check(CLI::Range(1, 256));
+  command
+      ->add_option("--autoencoder-iterations", settings.autoencoder.schedule.budget.iterations,
+                   "Variant latent: budget of the autoencoder, which is trained first (default 4000)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--kl-weight", settings.autoencoder.kl_weight, "Variant latent: weight of the KL divergence (default 1e-3)")
+      ->check(CLI::Range(0.0, 1e3));
   command->add_option("--members", settings.members, "Learn from the first so many training members (default all)")
       ->check(CLI::Range(2u, kMaxMembers));
   command->add_option("--batch", settings.batch, "Members an iteration (default 32)")->check(CLI::Range(1, 65536));

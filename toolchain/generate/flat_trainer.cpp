@@ -57,6 +57,11 @@ Share share_of(int64_t batch, int rank, int ranks) {
   return {first, batch * (rank + 1) / ranks - first};
 }
 
+void check_batch(uint32_t batch, const ProcessGroup& group, const std::string& run) {
+  if (static_cast<int64_t>(batch) >= group.size()) return;
+  throw InputError(run + ": a batch of " + std::to_string(batch) + " is too small for " + std::to_string(group.size()) + " ranks");
+}
+
 nlohmann::json log_to_json(const std::vector<FlatLogRow>& log) {
   nlohmann::json json = nlohmann::json::array();
   for (const FlatLogRow& row : log) {
@@ -98,10 +103,7 @@ FlatTrainer::FlatTrainer(FlatModel& model, ProcessGroup& group, FlatTraining opt
       average_(model.weights().clone()),
       optimiser_(model::adamw_group(static_cast<uint64_t>(model.weights().numel())),
                  {.beta1 = options_.beta1, .beta2 = options_.beta2, .epsilon = 1e-8, .weight_decay = options_.weight_decay}) {
-  if (static_cast<int64_t>(options_.batch) < group.size()) {
-    throw InputError(options_.run + ": a batch of " + std::to_string(options_.batch) + " is too small for " + std::to_string(group.size()) +
-                     " ranks");
-  }
+  check_batch(options_.batch, group, options_.run);
 }
 
 void FlatTrainer::resume(const nlohmann::json& log) {

@@ -26,6 +26,8 @@ struct Share {
   int64_t first = 0, count = 0;
 };
 Share share_of(int64_t batch, int rank, int ranks);
+// Throws InputError if a rank would have nothing to do.
+void check_batch(uint32_t batch, const ProcessGroup& group, const std::string& run);
 
 // What is trained. What it draws is a function of the iteration and the place in the batch.
 class FlatModel {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <utility>
 
 #include "toolchain/error.h"
 
@@ -13,21 +15,29 @@ using evaluate::Token;
 
 namespace {
 
-constexpr Variant kVariants[] = {Variant::kLayer, Variant::kFlat, Variant::kBasis};
+constexpr std::pair<Variant, const char*> kVariants[] = {
+    {Variant::kLayer, "layer"}, {Variant::kFlat, "flat"}, {Variant::kLatent, "latent"}, {Variant::kBasis, "basis"}};
 
 }  // namespace
 
-const char* to_string(Variant variant) { return variant == Variant::kLayer ? "layer" : variant == Variant::kFlat ? "flat" : "basis"; }
-
-Variant variant_from_string(const std::string& name) {
-  for (const Variant variant : kVariants) {
-    if (name == to_string(variant)) return variant;
+const char* to_string(Variant variant) {
+  for (const auto& [known, name] : kVariants) {
+    if (known == variant) return name;
   }
-  throw InputError("variant '" + name + "' is none of layer, flat, basis");
+  return "?";
 }
 
-ModelSpace::ModelSpace(const RowMatrix& training, const std::vector<Token>& tokens, const ModelSpaceOptions& options)
-    : options_(options), standardisation_(training, tokens) {
+Variant variant_from_string(const std::string& name) {
+  for (const auto& [variant, known] : kVariants) {
+    if (name == known) return variant;
+  }
+  throw InputError("variant '" + name + "' is none of layer, flat, latent, basis");
+}
+
+ModelSpace::ModelSpace(const RowMatrix& training, const std::vector<Token>& tokens, const ModelSpaceOptions& options,
+                       std::shared_ptr<const WeightCodec> codec)
+    : options_(options), standardisation_(training, tokens), codec_(std::move(codec)) {
+  if ((options_.variant == Variant::kLatent) != (codec_ != nullptr)) throw std::logic_error("an autoencoder belongs to variant latent");
   const size_t values = static_cast<size_t>(training.cols());
   if (options_.variant == Variant::kLayer) {
     for (const Token& token : tokens) token_sizes_.push_back(token.size);
@@ -35,6 +45,13 @@ ModelSpace::ModelSpace(const RowMatrix& training, const std::vector<Token>& toke
   } else if (options_.variant == Variant::kFlat) {
     token_sizes_.assign((values + options_.chunk - 1) / options_.chunk, options_.chunk);
     size_ = token_sizes_.size() * options_.chunk, dimension_ = standardisation_.varying();
+  } else if (options_.variant == Variant::kLatent) {
+    const RowMatrix latents = codec_->encode(standardisation_.standardise(training));
+    latent_mean_ = latents.colwise().mean();
+    latent_scale_ = std::sqrt((latents.rowwise() - latent_mean_).array().square().mean());
+    if (!(latent_scale_ > 0)) throw InputError("variant latent: the autoencoder gives all members the same latent values");
+    token_sizes_ = codec_->token_sizes();
+    size_ = dimension_ = static_cast<size_t>(latents.cols());
   } else {
     const RowMatrix z = standardisation_.standardise(training);
     for (const Token& token : tokens) {
@@ -52,6 +69,7 @@ ModelSpace::ModelSpace(const RowMatrix& training, const std::vector<Token>& toke
 
 RowMatrix ModelSpace::encode(const RowMatrix& weights) const {
   const RowMatrix z = standardisation_.standardise(weights);
+  if (codec_) return (codec_->encode(z).rowwise() - latent_mean_) / latent_scale_;
   RowMatrix out = RowMatrix::Zero(z.rows(), static_cast<Eigen::Index>(size_));
   if (options_.variant != Variant::kBasis) {
     out.leftCols(z.cols()) = z;
@@ -69,6 +87,7 @@ RowMatrix ModelSpace::encode(const RowMatrix& weights) const {
 
 RowVector ModelSpace::decode(const RowVector& values) const {
   const Eigen::Index width = standardisation_.mean().size();
+  if (codec_) return standardisation_.restore(codec_->decode(latent_mean_ + latent_scale_ * values).row(0));
   if (options_.variant != Variant::kBasis) return standardisation_.restore(values.head(width));
   RowVector z = RowVector::Zero(width);
   Eigen::Index at = 0;

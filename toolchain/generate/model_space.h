@@ -5,6 +5,7 @@
 //
 //   layer   one token a convolution and one for the shape: the standardised weights themselves (the paper)
 //   flat    the same values as one vector, zero-padded and cut into equal chunks (the paper's ablation, after Peebles et al. 2022)
+//   latent  what an autoencoder makes of the values, of one scale (the paper's ablation; autoencoder.h)
 //   basis   one token a convolution and one for the shape: coordinates in that token's principal directions, at most `rank` of them (ours;
 //           the paper's future work). Members that lie outside the training members' span cannot be reached.
 //
@@ -13,6 +14,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,8 +22,8 @@
 
 namespace figurine::generate {
 
-enum class Variant : uint8_t { kLayer, kFlat, kBasis };
-const char* to_string(Variant variant);                // "layer", "flat", "basis"
+enum class Variant : uint8_t { kLayer, kFlat, kLatent, kBasis };
+const char* to_string(Variant variant);                // "layer", "flat", "latent", "basis"
 Variant variant_from_string(const std::string& name);  // throws InputError naming the known ones
 
 struct ModelSpaceOptions {
@@ -30,10 +32,20 @@ struct ModelSpaceOptions {
   size_t chunk = 4096;  // of `flat`: values of a token
 };
 
+// A learnt map from standardised weights to fewer values and back.
+class WeightCodec {
+ public:
+  virtual ~WeightCodec() = default;
+  virtual evaluate::RowMatrix encode(const evaluate::RowMatrix& z) const = 0;        // [M,W] to [M,D]
+  virtual evaluate::RowMatrix decode(const evaluate::RowMatrix& latents) const = 0;  // [M,D] to [M,W]
+  virtual const std::vector<size_t>& token_sizes() const = 0;                        // [L]
+};
+
 class ModelSpace {
  public:
-  // training: [N,W] as read_weights gives them, N >= 2.
-  ModelSpace(const evaluate::RowMatrix& training, const std::vector<evaluate::Token>& tokens, const ModelSpaceOptions& options);
+  // training: [N,W] as read_weights gives them, N >= 2. codec: of `latent`, and of it alone.
+  ModelSpace(const evaluate::RowMatrix& training, const std::vector<evaluate::Token>& tokens, const ModelSpaceOptions& options,
+             std::shared_ptr<const WeightCodec> codec = nullptr);
 
   const ModelSpaceOptions& options() const { return options_; }
   const evaluate::Standardisation& standardisation() const { return standardisation_; }
@@ -44,7 +56,8 @@ class ModelSpace {
 
   // weights: [M,W]; model vectors [M,D], of mean square 1 over the training members and the varying values.
   evaluate::RowMatrix encode(const evaluate::RowMatrix& weights) const;
-  // The weights [W] of a model vector [D]. encode(decode(x)) == x but for rounding, except where x leaves its space (padding, dead values).
+  // The weights [W] of a model vector [D]. encode(decode(x)) == x but for rounding, except where x leaves its space (padding, dead values)
+  // and in `latent`, whose autoencoder only comes near.
   evaluate::RowVector decode(const evaluate::RowVector& values) const;
 
   // Of `basis`: directions of a token as orthonormal rows [K,size], and the factor between a model value and a coordinate.
@@ -58,6 +71,9 @@ class ModelSpace {
   size_t size_ = 0, dimension_ = 0;
   std::vector<evaluate::RowMatrix> directions_;
   std::vector<double> coordinate_scale_;
+  std::shared_ptr<const WeightCodec> codec_;
+  evaluate::RowVector latent_mean_;  // [D]
+  double latent_scale_ = 1;
 };
 
 }  // namespace figurine::generate

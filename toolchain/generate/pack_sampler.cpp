@@ -8,6 +8,7 @@
 #include "toolchain/generate/activation_ranges.h"
 #include "toolchain/generate/quantised_sampler.h"
 #include "toolchain/train/run_directory.h"
+#include "toolchain/train/threads.h"
 #include "toolchain/verify/golden_seeds.h"
 
 namespace figurine::generate {
@@ -48,7 +49,7 @@ std::vector<std::byte> pack_sampler(const PackSamplerOptions& options) {
   if (options.body.empty()) {
     throw InputError(options.run + ": say --body: the activation ranges are found by posing the population's members");
   }
-  at::set_num_threads(static_cast<int>(options.threads));
+  train::use_threads(options.threads);
   const TrainedSampler trained = TrainedSampler::open(options.run, options.population);
   const Population& population = trained.population->package.population();
   const train::PackageFile body = train::open_package(options.body, PackageKind::kBody);

@@ -6,6 +6,7 @@
 
 #include <charconv>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <torch/csrc/distributed/c10d/ProcessGroupGloo.hpp>
@@ -146,6 +147,8 @@ ProcessGroup::ProcessGroup(const RankPlace& place, double timeout_s) : place_(pl
   // c10d tells every attempt to connect with a stack below it; what is wrong in the end is said by what is thrown here.
   setenv("TORCH_CPP_LOG_LEVEL", "FATAL", 0);
   c10::initLogging();
+  // Gloo and the store write to connections of ranks that have just ended: that is to be an error here, not the end of this rank.
+  std::signal(SIGPIPE, SIG_IGN);
   const std::chrono::milliseconds timeout(static_cast<int64_t>(1000 * timeout_s));
   const std::string where = "no meeting of the ranks at " + place_.host + ":" + std::to_string(place_.port) + " within " +
                             std::to_string(static_cast<int64_t>(timeout_s)) + " s";

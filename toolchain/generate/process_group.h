@@ -43,8 +43,8 @@ class PeerLost : public InputError {
 
 class ProcessGroup {
  public:
-  // Waits for all ranks. Whatever waits for another rank, here or later, does so for timeout_s at most and then throws PeerLost; where a
-  // rank's process ends, its connections do, and the others hear of it at once.
+  // Waits for all ranks; the process ignores SIGPIPE from then on. Whatever waits for another rank, here or later, does so for timeout_s at
+  // most and then throws PeerLost; where a rank's process ends, its connections do, and the others hear of it at once.
   ProcessGroup(const RankPlace& place, double timeout_s);
   ~ProcessGroup();
   ProcessGroup(const ProcessGroup&) = delete;

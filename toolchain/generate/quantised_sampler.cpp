@@ -125,10 +125,9 @@ void QuantisedSampler::quantise_transformer(const TrainedSampler& trained) {
   const float* weights = flat.const_data_ptr<float>();
   const auto end_of = [](const std::string& name, const char* end) { return name.ends_with(end); };
   // The trainer's list has the package's order: projections, position, time, blocks, last norm, projections back.
-  for (const Transformer::Parameter& parameter : transformer.parameters()) {
+  for (const FlatParameter& parameter : transformer.layout().list()) {
     const float* from = weights + parameter.begin;
-    int64_t size = 1;
-    for (const int64_t length : parameter.shape) size *= length;
+    const int64_t size = parameter.count();
     if (parameter.name == "position") {
       position_.assign(from, from + size);
     } else if (parameter.name.find("norm") != std::string::npos) {

@@ -23,26 +23,33 @@ NoiseSchedule noise_schedule(const SamplerSettings& settings, size_t dimension) 
 
 nlohmann::json to_json(const SamplerSettings& settings) {
   const train::Schedule& schedule = settings.schedule;
-  return {{"variant", to_string(settings.space.variant)},
-          {"rank", settings.space.rank},
-          {"chunk", settings.space.chunk},
-          {"shape", to_json(settings.shape)},
-          {"members", settings.members},
-          {"clean_snr", settings.clean_snr},
-          {"noisy_dimension_snr", settings.noisy_dimension_snr},
-          {"batch", settings.batch},
-          {"ema", settings.ema},
-          {"seed", settings.seed},
-          {"bf16", settings.bf16},
-          {"threads", settings.threads},
-          {"beta1", settings.beta1},
-          {"beta2", settings.beta2},
-          {"weight_decay", settings.weight_decay},
-          {"learning_rate", schedule.peak},
-          {"ramp_iterations", schedule.ramp_iterations},
-          {"floor_fraction", schedule.floor_fraction},
-          {"iterations", schedule.budget.iterations},
-          {"seconds", schedule.budget.seconds}};
+  nlohmann::json json = {{"variant", to_string(settings.space.variant)},
+                         {"rank", settings.space.rank},
+                         {"chunk", settings.space.chunk},
+                         {"shape", to_json(settings.shape)},
+                         {"members", settings.members},
+                         {"clean_snr", settings.clean_snr},
+                         {"noisy_dimension_snr", settings.noisy_dimension_snr},
+                         {"batch", settings.batch},
+                         {"ema", settings.ema},
+                         {"seed", settings.seed},
+                         {"bf16", settings.bf16},
+                         {"threads", settings.threads},
+                         {"beta1", settings.beta1},
+                         {"beta2", settings.beta2},
+                         {"weight_decay", settings.weight_decay},
+                         {"learning_rate", schedule.peak},
+                         {"ramp_iterations", schedule.ramp_iterations},
+                         {"floor_fraction", schedule.floor_fraction},
+                         {"iterations", schedule.budget.iterations},
+                         {"seconds", schedule.budget.seconds}};
+  if (settings.space.variant == Variant::kLatent) {
+    json["autoencoder"] = {{"channels", settings.autoencoder.channels},
+                           {"kl_weight", settings.autoencoder.kl_weight},
+                           {"learning_rate", settings.autoencoder.schedule.peak},
+                           {"iterations", settings.autoencoder.schedule.budget.iterations}};
+  }
+  return json;
 }
 
 SamplerSettings sampler_settings_from_json(const nlohmann::json& json, const std::string& where) {
@@ -61,6 +68,13 @@ SamplerSettings sampler_settings_from_json(const nlohmann::json& json, const std
     settings.schedule.peak = json.at("learning_rate").get<double>();
     settings.schedule.ramp_iterations = json.at("ramp_iterations").get<uint64_t>();
     settings.schedule.floor_fraction = json.at("floor_fraction").get<double>();
+    if (settings.space.variant == Variant::kLatent) {
+      const nlohmann::json& autoencoder = json.at("autoencoder");
+      settings.autoencoder.channels = autoencoder.at("channels").get<int64_t>();
+      settings.autoencoder.kl_weight = autoencoder.at("kl_weight").get<double>();
+      settings.autoencoder.schedule.peak = autoencoder.at("learning_rate").get<double>();
+      settings.autoencoder.schedule.budget = {.iterations = autoencoder.at("iterations").get<uint64_t>(), .seconds = 0};
+    }
     settings.schedule.budget = {.iterations = json.at("iterations").get<uint64_t>(), .seconds = json.at("seconds").get<double>()};
   } catch (const nlohmann::json::exception& error) {
     throw InputError(where + ": " + error.what());

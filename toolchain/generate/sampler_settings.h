@@ -23,8 +23,16 @@ inline constexpr TransformerPreset kTransformerPresets[] = {
     {"small", 128, 4, 8, 512}, {"device", 256, 12, 16, 1024}, {"paper", 512, 12, 16, 2048}};
 const TransformerPreset& find_transformer_preset(const std::string& name);  // throws InputError naming the known ones
 
+// Of the autoencoder of variant `latent`, which is trained before the denoiser, on the same batches' size and with the same betas.
+struct AutoencoderSettings {
+  int64_t channels = 4;     // of the latent map
+  double kl_weight = 1e-3;  // against the mean square error of a standardised value
+  train::Schedule schedule{.peak = 1e-3, .ramp_iterations = 100, .floor_fraction = 0.02, .budget = {.iterations = 4000, .seconds = 0}};
+};
+
 struct SamplerSettings {
   ModelSpaceOptions space;
+  AutoencoderSettings autoencoder;   // of variant `latent` alone
   TransformerShape shape;            // token_sizes follow from the space
   uint32_t members = 0;              // the first so many training members; 0: all
   double clean_snr = 1e4;            // where sampling ends: 40 dB, below the rounding of int8

@@ -1,18 +1,20 @@
 #include "toolchain/generate/sampler_trainer.h"
 
-#include <ATen/Parallel.h>
-
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
 
 #include "figurine/noise_level.h"
 #include "toolchain/error.h"
+#include "toolchain/generate/autoencoder.h"
 #include "toolchain/generate/flat_trainer.h"
+#include "toolchain/generate/tensors.h"
 #include "toolchain/train/random.h"
 #include "toolchain/train/run_directory.h"
+#include "toolchain/train/threads.h"
 
 namespace figurine::generate {
 
@@ -23,19 +25,6 @@ namespace {
 constexpr int kSamplerFormat = 1;
 constexpr int64_t kValidationDraws = 16;  // noise levels for each validation member, always the same ones
 enum Stream : uint64_t { kLevels = 1, kNoise = 2, kValidationNoise = 3 };
-
-torch::Tensor to_tensor(const RowMatrix& rows) {
-  const torch::Tensor out = torch::empty({rows.rows(), rows.cols()});
-  float* data = out.data_ptr<float>();
-  for (Eigen::Index i = 0; i < rows.size(); ++i) data[i] = static_cast<float>(rows.data()[i]);
-  return out;
-}
-
-// [D] standard normal of one draw.
-torch::Tensor draw_noise(uint64_t seed, Stream stream, uint64_t counter, int64_t size) {
-  auto generator = at::make_generator<at::CPUGeneratorImpl>(train::random_bits(seed, stream, counter));
-  return torch::randn({size}, generator);
-}
 
 struct NoisyBatch {
   torch::Tensor z, lambda, clean;  // [B,D], [B], [B,D]
@@ -50,29 +39,6 @@ void add_noisy(NoisyBatch& batch, int64_t row, const torch::Tensor& x, const tor
 
 NoisyBatch empty_batch(int64_t rows, int64_t size) {
   return {torch::empty({rows, size}), torch::empty({rows}, torch::kFloat64), torch::empty({rows, size})};
-}
-
-void save_weights(const train::RunDirectory& run, const Transformer& transformer, const torch::Tensor& weights) {
-  train::TensorFile file;
-  const float* data = weights.data_ptr<float>();
-  for (const Transformer::Parameter& parameter : transformer.parameters()) {
-    int64_t count = 1;
-    for (const int64_t length : parameter.shape) count *= length;
-    const float* begin = data + parameter.begin;
-    file.tensors[parameter.name] = {parameter.shape, {begin, begin + count}};
-  }
-  train::write_tensor_file(run.weights(), file);
-}
-
-void load_weights(const train::RunDirectory& run, Transformer& transformer) {
-  const train::TensorFile file = train::read_tensor_file(run.weights());
-  float* data = transformer.weights().data_ptr<float>();
-  for (const Transformer::Parameter& parameter : transformer.parameters()) {
-    const auto found = file.tensors.find(parameter.name);
-    if (found == file.tensors.end()) throw InputError(run.weights() + ": " + parameter.name + ": missing");
-    if (found->second.shape != parameter.shape) throw InputError(run.weights() + ": " + parameter.name + ": is of another shape");
-    std::memcpy(data + parameter.begin, found->second.values.data(), found->second.values.size() * sizeof(float));
-  }
 }
 
 // The denoiser and the batches that it learns from.
@@ -140,7 +106,7 @@ class Denoising : public FlatModel {
 };
 
 nlohmann::json describe(const SamplerRequest& request, const SamplerSettings& settings, const train::PackageFile& population,
-                        const ModelSpace& space, size_t training, size_t validation) {
+                        size_t dimension, size_t training, size_t validation) {
   return {{"format", kSamplerFormat},
           {"status", "running"},
           {"tool", "figurine-train " FIGURINE_VERSION},
@@ -151,7 +117,7 @@ nlohmann::json describe(const SamplerRequest& request, const SamplerSettings& se
           {"settings", to_json(settings)},
           {"parameters", parameter_count(settings.shape)},
           {"macs_per_evaluation", mac_count(settings.shape)},
-          {"dimension", space.dimension()},
+          {"dimension", dimension},
           {"training_members", training},
           {"validation_members", validation},
           {"population",
@@ -274,19 +240,76 @@ SamplerResult result_of(const nlohmann::json& description) {
           .was_finished = true};
 }
 
+nlohmann::json to_json(const FlatProgress& progress, const char* status) {
+  return {{"status", status},
+          {"iterations", progress.iteration},
+          {"train_seconds", progress.seconds},
+          {"loss", progress.loss},
+          {"validation_loss", std::isfinite(progress.validation_loss) ? nlohmann::json(progress.validation_loss) : nlohmann::json()},
+          {"log", log_to_json(progress.log)}};
+}
+
 // The run's files besides the checkpoint, after one was written.
 void save_run(const train::RunDirectory& run, nlohmann::json& description, const Transformer& transformer, const torch::Tensor& average,
               const char* status, const FlatProgress& progress) {
-  save_weights(run, transformer, average);
+  save_parameters(run.weights(), transformer.layout(), average);
   save_log(run.log(), progress.log);
-  description["log"] = log_to_json(progress.log);
-  description["status"] = status;
-  description["iterations"] = progress.iteration;
-  description["train_seconds"] = progress.seconds;
-  description["loss"] = progress.loss;
-  description["validation_loss"] = std::isfinite(progress.validation_loss) ? nlohmann::json(progress.validation_loss) : nlohmann::json();
+  description.update(to_json(progress, status));
   description["updated"] = train::utc_now();
   train::write_json(run.run_json(), description);
+}
+
+}  // namespace
+
+namespace {
+
+std::string autoencoder_file(const train::RunDirectory& run) { return run.path + "/autoencoder.safetensors"; }
+std::string autoencoder_log(const train::RunDirectory& run) { return run.path + "/autoencoder_log.csv"; }
+std::string autoencoder_checkpoint(const train::RunDirectory& run) { return run.path + "/autoencoder_checkpoint.safetensors"; }
+
+FlatTraining training_of(const SamplerRequest& request, const SamplerSettings& settings) {
+  return {.title = "sampler",
+          .run = request.run,
+          .checkpoint = train::RunDirectory{request.run}.checkpoint(),
+          .batch = settings.batch,
+          .schedule = settings.schedule,
+          .beta1 = settings.beta1,
+          .beta2 = settings.beta2,
+          .weight_decay = settings.weight_decay,
+          .ema = settings.ema,
+          .checkpoint_period_s = request.checkpoint_period_s,
+          .stop_after = request.stop_after,
+          .quiet = request.quiet};
+}
+
+// Stage one of variant `latent`. Where it is done already it only takes what it was done with. description: the run's, on rank 0.
+void train_autoencoder(const std::shared_ptr<Autoencoder>& autoencoder, const SamplerRequest& request, const SamplerSettings& settings,
+                       const Members& members, const std::vector<evaluate::Token>& tokens, ProcessGroup& group,
+                       nlohmann::json& description) {
+  const train::RunDirectory run{request.run};
+  const evaluate::Standardisation standardisation(members.training, tokens);
+  Autoencoding autoencoding(autoencoder, settings, standardisation.standardise(members.training),
+                            standardisation.standardise(members.validation));
+  FlatTraining training = training_of(request, settings);
+  training.title = "autoencoder", training.checkpoint = autoencoder_checkpoint(run), training.schedule = settings.autoencoder.schedule;
+  FlatTrainer trainer(autoencoding, group, training, [&](const char* status, const FlatProgress& progress) {
+    save_parameters(autoencoder_file(run), autoencoder->parameters().layout(), trainer.average());
+    save_log(autoencoder_log(run), progress.log);
+    description["autoencoder"] = to_json(progress, status);
+    description["status"] = status == std::string("finished") ? "running" : status;
+    train::write_json(run.run_json(), description);
+  });
+  if (group.leads() && request.resume) {
+    const nlohmann::json before = description.value("autoencoder", nlohmann::json::object());
+    trainer.resume(before.value("log", nlohmann::json::array()));
+  }
+  trainer.run();
+  autoencoding.weights().copy_(trainer.average());
+}
+
+ModelSpace make_space(const Members& members, const std::vector<evaluate::Token>& tokens, const SamplerSettings& settings,
+                      std::shared_ptr<const WeightCodec> codec) {
+  return {members.training, tokens, settings.space, std::move(codec)};
 }
 
 }  // namespace
@@ -300,35 +323,39 @@ SamplerResult train_sampler(const SamplerRequest& request) {
   if (plan.finished) return group.leads() ? result_of(plan.description) : SamplerResult{.was_finished = true};
   SamplerSettings& settings = plan.settings;
   const Members members = members_of(population.package.population(), settings, request.population);
-  const ModelSpace space(members.training, tokens_of(population.package.population()), settings.space);
-  settings.shape.token_sizes.assign(space.token_sizes().begin(), space.token_sizes().end());
+  const std::vector<evaluate::Token> tokens = tokens_of(population.package.population());
+  train::use_threads(settings.threads);
+
+  // What can be wrong is found before anything is written: the tokens of `latent` are known before its autoencoder is trained.
+  std::shared_ptr<Autoencoder> autoencoder;
+  if (settings.space.variant == Variant::kLatent) {
+    autoencoder = std::make_shared<Autoencoder>(static_cast<size_t>(members.training.cols()), settings.autoencoder, settings.seed);
+  }
+  std::optional<ModelSpace> space;
+  if (!autoencoder) space.emplace(make_space(members, tokens, settings, nullptr));
+  const std::vector<size_t>& token_sizes = autoencoder ? autoencoder->token_sizes() : space->token_sizes();
+  settings.shape.token_sizes.assign(token_sizes.begin(), token_sizes.end());
   check(settings.shape);
-  noise_schedule(settings, space.dimension());
-  at::set_num_threads(static_cast<int>(settings.threads));
-  Denoising denoising(settings, space.dimension(), space.encode(members.training), space.encode(members.validation));
-  const FlatTraining training{.title = "sampler",
-                              .run = request.run,
-                              .checkpoint = run.checkpoint(),
-                              .batch = settings.batch,
-                              .schedule = settings.schedule,
-                              .beta1 = settings.beta1,
-                              .beta2 = settings.beta2,
-                              .weight_decay = settings.weight_decay,
-                              .ema = settings.ema,
-                              .checkpoint_period_s = request.checkpoint_period_s,
-                              .stop_after = request.stop_after,
-                              .quiet = request.quiet};
-  FlatTrainer trainer(denoising, group, training, [&](const char* status, const FlatProgress& progress) {
-    save_run(run, plan.description, denoising.transformer(), trainer.average(), status, progress);
-  });
+  check_batch(settings.batch, group, request.run);
+  const size_t dimension = space ? space->dimension() : std::accumulate(token_sizes.begin(), token_sizes.end(), size_t{0});
+  noise_schedule(settings, dimension);
   if (group.leads() && plan.description.empty()) {
     std::error_code error;
     std::filesystem::create_directories(request.run, error);
     if (error) throw InputError(request.run + ": cannot be created: " + error.message());
-    plan.description = describe(request, settings, population, space, static_cast<size_t>(members.training.rows()),
+    plan.description = describe(request, settings, population, dimension, static_cast<size_t>(members.training.rows()),
                                 static_cast<size_t>(members.validation.rows()));
     train::write_json(run.run_json(), plan.description);
   }
+  if (autoencoder) {
+    train_autoencoder(autoencoder, request, settings, members, tokens, group, plan.description);
+    space.emplace(make_space(members, tokens, settings, autoencoder));
+  }
+
+  Denoising denoising(settings, dimension, space->encode(members.training), space->encode(members.validation));
+  FlatTrainer trainer(denoising, group, training_of(request, settings), [&](const char* status, const FlatProgress& progress) {
+    save_run(run, plan.description, denoising.transformer(), trainer.average(), status, progress);
+  });
   if (group.leads() && request.resume) trainer.resume(plan.description.value("log", nlohmann::json::array()));
   const FlatProgress progress = trainer.run();
   return {.iteration = progress.iteration,
@@ -348,10 +375,16 @@ TrainedSampler TrainedSampler::open(const std::string& path, const std::string& 
   check_population(description, *sampler.population, run, where);
   const Population& people = sampler.population->package.population();
   const Members members = members_of(people, sampler.settings, where);
-  sampler.space = std::make_unique<ModelSpace>(members.training, tokens_of(people), sampler.settings.space);
+  std::shared_ptr<Autoencoder> autoencoder;
+  if (sampler.settings.space.variant == Variant::kLatent) {
+    autoencoder =
+        std::make_shared<Autoencoder>(static_cast<size_t>(members.training.cols()), sampler.settings.autoencoder, sampler.settings.seed);
+    load_parameters(autoencoder_file(run), autoencoder->parameters().layout(), autoencoder->parameters().weights());
+  }
+  sampler.space = std::make_unique<ModelSpace>(make_space(members, tokens_of(people), sampler.settings, autoencoder));
   sampler.training = sampler.space->encode(members.training);
   sampler.transformer = std::make_unique<Transformer>(sampler.settings.shape, sampler.settings.seed);
-  load_weights(run, *sampler.transformer);
+  load_parameters(run.weights(), sampler.transformer->layout(), sampler.transformer->weights());
   return sampler;
 }
 

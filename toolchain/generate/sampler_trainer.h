@@ -9,6 +9,8 @@
 //   RUN/log.csv                  iteration, seconds, learning rate, loss, loss of the validation members (empty if there are none)
 //   RUN/weights.safetensors      the denoiser, moving average: one tensor a parameter
 //   RUN/checkpoint.safetensors   what --resume needs
+//   RUN/autoencoder.safetensors, autoencoder_checkpoint.safetensors, autoencoder_log.csv   of variant `latent`: the same, of what is
+//                                trained first; its validation loss is the mean square error of a standardised value
 //
 // Based on: the paper, section 4.2; Ho et al., DDPM, 2020; Song et al., Score-based models, 2021 (the moving average).
 #pragma once

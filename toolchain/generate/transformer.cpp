@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
 #include "toolchain/error.h"
 
@@ -13,19 +12,10 @@ namespace {
 constexpr double kSlowest = 1.0 / 20, kFastest = 20;  // radians a unit of lambda
 constexpr double kPositionDeviation = 0.02;
 
-int64_t value_count(const std::vector<int64_t>& shape) {
-  return std::accumulate(shape.begin(), shape.end(), int64_t{1}, std::multiplies<>());
-}
-
 // Names and shapes of all parameters, in the order of the flat tensor.
-std::vector<Transformer::Parameter> list_parameters(const TransformerShape& shape) {
-  std::vector<Transformer::Parameter> list;
-  int64_t at = 0;
-  const auto add = [&](const std::string& name, std::vector<int64_t> size) {
-    const int64_t count = value_count(size);
-    list.push_back({name, std::move(size), at});
-    at += count;
-  };
+FlatLayout layout_of(const TransformerShape& shape) {
+  FlatLayout layout;
+  const auto add = [&](const std::string& name, std::vector<int64_t> size) { layout.add(name, std::move(size)); };
   const int64_t d = shape.d_model, tokens = static_cast<int64_t>(shape.token_sizes.size());
   for (int64_t l = 0; l < tokens; ++l) {
     add("proj." + std::to_string(l) + ".weight", {d, shape.token_sizes[static_cast<size_t>(l)]});
@@ -47,7 +37,7 @@ std::vector<Transformer::Parameter> list_parameters(const TransformerShape& shap
     add("unproj." + std::to_string(l) + ".weight", {shape.token_sizes[static_cast<size_t>(l)], d});
     add("unproj." + std::to_string(l) + ".bias", {shape.token_sizes[static_cast<size_t>(l)]});
   }
-  return list;
+  return layout;
 }
 
 bool ends_with(const std::string& text, const char* end) { return text.ends_with(end); }
@@ -91,10 +81,7 @@ TransformerShape shape_from_json(const nlohmann::json& json, const std::string& 
   return shape;
 }
 
-uint64_t parameter_count(const TransformerShape& shape) {
-  const std::vector<Transformer::Parameter> list = list_parameters(shape);
-  return static_cast<uint64_t>(list.back().begin + value_count(list.back().shape));
-}
+uint64_t parameter_count(const TransformerShape& shape) { return static_cast<uint64_t>(layout_of(shape).count()); }
 
 uint64_t mac_count(const TransformerShape& shape) {
   const auto d = static_cast<uint64_t>(shape.d_model), tokens = shape.token_sizes.size() + 1;
@@ -114,17 +101,17 @@ torch::Tensor embed_lambda(const torch::Tensor& lambda, int64_t width) {
 
 struct Transformer::Impl {
   TransformerShape shape;
-  std::vector<Parameter> list;
-  torch::Tensor weights, gradients;    // [P]
-  std::vector<torch::Tensor> tensors;  // views of the weights, leaves whose gradients are views of the gradients
-  std::vector<int64_t> splits;
+  FlatParameters parameters;
+  const std::vector<int64_t>& splits = shape.token_sizes;
+
+  explicit Impl(const TransformerShape& own) : shape(own), parameters(layout_of(own)) {}
 
   // A reader of the parameters in the order of the list.
   struct Reader {
     const Impl& impl;
     size_t at;
     bool bf16;
-    const torch::Tensor& next() { return impl.tensors[at++]; }
+    const torch::Tensor& next() { return impl.parameters.leaf(at++); }
     torch::Tensor linear(const torch::Tensor& x) {
       const torch::Tensor &weight = next(), &bias = next();
       if (!bf16) return torch::linear(x, weight, bias);
@@ -165,29 +152,24 @@ struct Transformer::Impl {
   }
 };
 
-Transformer::Transformer(const TransformerShape& shape, uint64_t seed) : impl_(std::make_unique<Impl>()) {
+Transformer::Transformer(const TransformerShape& shape, uint64_t seed) {
   check(shape);
-  Impl& impl = *impl_;
-  impl.shape = shape, impl.list = list_parameters(shape), impl.splits = shape.token_sizes;
-  const auto count = static_cast<int64_t>(generate::parameter_count(shape));
-  impl.weights = torch::zeros({count}), impl.gradients = torch::zeros({count});
+  impl_ = std::make_unique<Impl>(shape);
+  const torch::NoGradGuard no_gradient;
   auto generator = at::make_generator<at::CPUGeneratorImpl>(seed);
   double bound = 0;  // of the weight before: its bias has the same
-  for (const Parameter& parameter : impl.list) {
-    const int64_t size = value_count(parameter.shape);
-    const auto view = [&](const torch::Tensor& flat) { return flat.narrow(0, parameter.begin, size).view(parameter.shape); };
-    torch::Tensor values = view(impl.weights);
-    if (parameter.name.find("norm") != std::string::npos) {
-      values.fill_(ends_with(parameter.name, "weight") ? 1 : 0);
-    } else if (parameter.name == "position") {
+  const std::vector<FlatParameter>& list = impl_->parameters.layout().list();
+  for (size_t i = 0; i < list.size(); ++i) {
+    const std::string& name = list[i].name;
+    torch::Tensor values = impl_->parameters.leaf(i);
+    if (name.find("norm") != std::string::npos) {
+      values.fill_(ends_with(name, "weight") ? 1 : 0);
+    } else if (name == "position") {
       values.normal_(0, kPositionDeviation, generator);
-    } else if (!parameter.name.starts_with("unproj")) {
-      if (ends_with(parameter.name, "weight")) bound = 1 / std::sqrt(static_cast<double>(parameter.shape.back()));
+    } else if (!name.starts_with("unproj")) {
+      if (ends_with(name, "weight")) bound = 1 / std::sqrt(static_cast<double>(list[i].shape.back()));
       values.uniform_(-bound, bound, generator);
     }
-    torch::Tensor leaf = values.detach().requires_grad_();
-    leaf.mutable_grad() = view(impl.gradients);
-    impl.tensors.push_back(leaf);
   }
 }
 
@@ -196,9 +178,9 @@ Transformer::~Transformer() = default;
 torch::Tensor Transformer::forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16) const {
   return impl_->forward(z, lambda, bf16);
 }
-torch::Tensor& Transformer::weights() { return impl_->weights; }
-torch::Tensor& Transformer::gradients() { return impl_->gradients; }
+torch::Tensor& Transformer::weights() { return impl_->parameters.weights(); }
+torch::Tensor& Transformer::gradients() { return impl_->parameters.gradients(); }
+const FlatLayout& Transformer::layout() const { return impl_->parameters.layout(); }
 const TransformerShape& Transformer::shape() const { return impl_->shape; }
-const std::vector<Transformer::Parameter>& Transformer::parameters() const { return impl_->list; }
 
 }  // namespace figurine::generate

@@ -6,8 +6,7 @@
 //   x_l = Unproj_l(LayerNorm(t_l))
 //
 // lambda = ln(alpha / sigma), half the log of the signal-to-noise ratio, is the only time there is: the network knows no number of steps.
-// All parameters live in one flat float tensor, so that the optimiser, the moving average, checkpoints and an all-reduce are each one
-// operation on it.
+// All parameters live in one flat tensor (flat_parameters.h).
 //
 // Based on: the paper, section 4.2; Erkoc et al., HyperDiffusion, 2023; Radford et al., GPT-2, 2019 (pre-norm blocks).
 #pragma once
@@ -19,6 +18,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
+
+#include "toolchain/generate/flat_parameters.h"
 
 namespace figurine::generate {
 
@@ -54,15 +55,8 @@ class Transformer {
 
   torch::Tensor& weights();    // [P] flat; assign into it in place only
   torch::Tensor& gradients();  // [P] flat; backward passes add to it
+  const FlatLayout& layout() const;
   const TransformerShape& shape() const;
-
-  // Where each named parameter lies in the flat tensor, in its order.
-  struct Parameter {
-    std::string name;
-    std::vector<int64_t> shape;
-    int64_t begin = 0;
-  };
-  const std::vector<Parameter>& parameters() const;
 
  private:
   struct Impl;

@@ -82,9 +82,11 @@ class Ranks {
       if (count <= 0) break;
       text.append(part, static_cast<size_t>(count));
     }
-    waitpid(child.pid, nullptr, 0);
+    int status = 0;
+    waitpid(child.pid, &status, 0);
     close(child.pipe);
     child.pipe = -1;
+    if (WIFSIGNALED(status) && WTERMSIG(status) != SIGKILL) text += " [signal " + std::to_string(WTERMSIG(status)) + "]";
     return text;
   }
 

@@ -117,6 +117,19 @@ TEST_F(SamplerRanks, EndWhereOneProcessEnds) {
   }
 }
 
+// The autoencoder of variant `latent` is trained by all ranks, too, and only rank 0 has its file.
+TEST_F(SamplerRanks, TrainAnAutoencoderTogether) {
+  SamplerRequest latent = request("latent", 10);
+  latent.settings.space.variant = Variant::kLatent;
+  latent.settings.autoencoder = {.channels = 2, .schedule = latent.settings.schedule};
+  latent.stop_after = 5;  // in the autoencoder
+  train(2, latent);
+  latent.resume = true, latent.stop_after = 0;
+  const std::vector<std::string> two = train(2, latent);
+  EXPECT_EQ(two[0].rfind("10 ", 0), 0u) << two[0];
+  EXPECT_EQ(two[1], two[0]);
+}
+
 TEST_F(SamplerRanks, GoOnWithTheSameBits) {
   const std::vector<std::string> whole = train(2, request("whole", 40));
   SamplerRequest cut = request("cut", 40);

@@ -35,6 +35,7 @@ class SamplerTraining : public testing::Test {
     SamplerRequest request{.population = path("people.fgn"), .run = path(run), .settings = {}, .command = "test", .quiet = true};
     request.settings.space = {.variant = variant, .rank = 8, .chunk = 128};
     request.settings.shape = {.token_sizes = {}, .d_model = 16, .blocks = 1, .heads = 2, .feed_forward = 32};
+    request.settings.autoencoder.channels = 2, request.settings.autoencoder.schedule.budget = {.iterations = 40, .seconds = 0};
     request.settings.batch = 8, request.settings.schedule.peak = 3e-3, request.settings.schedule.ramp_iterations = 5;
     request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
     return request;
@@ -62,7 +63,7 @@ class SamplerTraining : public testing::Test {
 
 // The loss of predicting the mean is 1, the mean square of a member.
 TEST_F(SamplerTraining, LearnsInEveryVariant) {
-  for (const Variant variant : {Variant::kLayer, Variant::kFlat, Variant::kBasis}) {
+  for (const Variant variant : {Variant::kLayer, Variant::kFlat, Variant::kLatent, Variant::kBasis}) {
     const std::string run = to_string(variant);
     const SamplerResult result = train_sampler(request(run, variant, 250));
     std::printf("  %s: loss %.3f, validation %.3f\n", run.c_str(), result.loss, result.validation_loss);
@@ -91,6 +92,29 @@ TEST_F(SamplerTraining, GoesOnWithTheSameBits) {
   other.settings.seed = 2;
   train_sampler(other);
   EXPECT_NE(weights("other"), weights("whole"));
+}
+
+// Stopped in the autoencoder, and in the denoiser that follows.
+TEST_F(SamplerTraining, GoesOnWithTheSameBitsFromTheAutoencoder) {
+  const SamplerResult whole = train_sampler(request("whole", Variant::kLatent));
+  SamplerRequest cut = request("cut", Variant::kLatent);
+  for (const uint64_t stop : {7u, 50u}) {
+    cut.stop_after = stop;
+    EXPECT_THROW(train_sampler(cut), train::Interrupted);
+    EXPECT_EQ(fs::exists(path("cut") + "/weights.safetensors"), stop == 50);
+    cut.resume = true;
+    cut.settings.autoencoder.channels = 3;  // the run's own settings count
+  }
+  cut.stop_after = 0;
+  EXPECT_EQ(train_sampler(cut).weights_hash, whole.weights_hash);
+  EXPECT_EQ(weights("cut"), weights("whole"));
+  const TrainedSampler sampler = TrainedSampler::open(path("cut"));
+  EXPECT_NEAR(sampler.training.squaredNorm() / static_cast<double>(sampler.training.size()), 1, 1e-9) << "of unit scale";
+  const evaluate::RowVector back = sampler.space->decode(sampler.training.row(0));
+  EXPECT_EQ(back.size(), sampler.space->standardisation().mean().size());
+  EXPECT_TRUE(back.array().isFinite().all());
+  fs::remove(path("cut") + "/autoencoder.safetensors");
+  EXPECT_THROW(TrainedSampler::open(path("cut")), InputError);
 }
 
 TEST_F(SamplerTraining, NeverLooksAtTheTestPart) {
