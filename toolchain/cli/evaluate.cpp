@@ -224,6 +224,7 @@ void add_evaluate_command(CLI::App& app) {
   add_evaluate_members_command(*command);
   add_evaluate_generation_command(*command);
   add_evaluate_sampling_command(*command);
+  add_evaluate_features_command(*command);
 
   CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, before rounding to 8 bits");
   add_run_options(parity, arguments);

@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   figurine::cli::add_pack_command(app);
   figurine::cli::add_population_command(app);
   figurine::cli::add_sampler_command(app);
+  figurine::cli::add_features_command(app);
   figurine::cli::add_evaluate_command(app);
   try {
     app.parse(argc, argv);
