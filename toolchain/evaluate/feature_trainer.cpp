@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -35,6 +36,7 @@ constexpr double kSmallest = 0.85, kLargest = 1.12;  // of the picture, by augme
 constexpr double kShift = 0.08;                      // of its side, at most
 constexpr double kRunningMean = 0.02;
 constexpr size_t kWeighedPairs = 256;  // of training members, for the weights of the distance
+constexpr double kFloorShare = 0.5;
 constexpr size_t kMostPictures = 8192;
 constexpr uint32_t kViews = 6, kFewestViews = 2;
 enum Stream : uint64_t { kZoom = 2, kShiftX = 3, kShiftY = 4, kPairs = 5, kClasses = 6 };
@@ -270,37 +272,58 @@ class FeatureTrainer {
     train::write_tensor_file(checkpoint(), file);
   }
 
-  // One weight a layer: 1 / (layers x mean distance of two training members in one shot).
-  std::vector<torch::Tensor> weigh_layers(const torch::Tensor& network) {
-    std::vector<std::vector<double>> distances(kWeighedPairs);
-    threads_.each(kWeighedPairs, [&](size_t i) {
-      const torch::NoGradGuard no_gradient;
+  // For every layer e, a share of the mean |a|, and one weight of all channels, 1 / (layers x mean distance): over pairs of training
+  // members in one shot.
+  std::vector<LayerWeights> weigh_layers(const torch::Tensor& network) {
+    struct Pair {
+      size_t a, b, shot;
+    };
+    std::vector<Pair> pairs;
+    for (size_t i = 0; i < kWeighedPairs; ++i) {
       const auto draw = [&](uint64_t what, size_t count) {
         return static_cast<size_t>(train::random_bits(settings_.seed, kPairs, 3 * i + what) % count);
       };
-      const size_t a = draw(0, bank_.members), b = (a + 1 + draw(1, bank_.members - 1)) % bank_.members, shot = draw(2, bank_.shots);
-      const auto activations = [&](size_t member) {
-        const torch::Tensor picture = bank_.values.narrow(0, static_cast<int64_t>(member * bank_.shots + shot), 1);
-        return run_feature_network(network, picture.to(torch::kFloat32) / 255).activations;
-      };
-      distances[i] = layer_distances(activations(a), activations(b));
-    });
-    std::vector<torch::Tensor> weights;
+      const size_t a = draw(0, bank_.members);
+      pairs.push_back({a, (a + 1 + draw(1, bank_.members - 1)) % bank_.members, draw(2, bank_.shots)});
+    }
+    const auto activations = [&](size_t member, size_t shot) {
+      const torch::NoGradGuard no_gradient;
+      const torch::Tensor picture = bank_.values.narrow(0, static_cast<int64_t>(member * bank_.shots + shot), 1);
+      return run_feature_network(network, picture.to(torch::kFloat32) / 255).activations;
+    };
+    std::vector<double> floors = mean_of_layers(
+        pairs.size(), [&](size_t i) { return layer_norms(activations(pairs[i].a, pairs[i].shot)); }, "sees nothing of training members");
+    for (double& floor : floors) floor = static_cast<float>(kFloorShare * floor);  // as it will be stored
+    const std::vector<double> distances = mean_of_layers(
+        pairs.size(),
+        [&](size_t i) { return layer_distances(activations(pairs[i].a, pairs[i].shot), activations(pairs[i].b, pairs[i].shot), floors); },
+        "sees no difference between training members");
+    std::vector<LayerWeights> weights;
     for (size_t l = 0; l < kFeatureLayers; ++l) {
-      double mean = 0;
-      for (const std::vector<double>& own : distances) mean += own[l] / static_cast<double>(kWeighedPairs);
-      if (!(mean > 0)) throw InputError(request_.output + ": layer " + std::to_string(l) + " sees no difference between training members");
-      weights.push_back(torch::full({kFeatureStages[l].out}, 1 / (static_cast<double>(kFeatureLayers) * mean), torch::kFloat32));
+      const double weight = 1 / (static_cast<double>(kFeatureLayers) * distances[l]);
+      weights.push_back({torch::full({kFeatureStages[l].out}, weight, torch::kFloat32), floors[l]});
     }
     return weights;
   }
 
+  // Means of one value a layer over `count` pieces, which must be above 0.
+  std::vector<double> mean_of_layers(size_t count, const std::function<std::vector<double>(size_t)>& piece, const std::string& otherwise) {
+    std::vector<std::vector<double>> values(count);
+    threads_.each(count, [&](size_t i) { values[i] = piece(i); });
+    std::vector<double> means(kFeatureLayers, 0);
+    for (size_t l = 0; l < kFeatureLayers; ++l) {
+      for (const std::vector<double>& own : values) means[l] += own[l] / static_cast<double>(count);
+      if (!(means[l] > 0)) throw InputError(request_.output + ": layer " + std::to_string(l) + " " + otherwise);
+    }
+    return means;
+  }
+
   void finish() {
     const torch::Tensor network = weights_.narrow(0, 0, feature_parameter_count()).clone();
-    std::vector<torch::Tensor> channel_weights = weigh_layers(network);
+    std::vector<LayerWeights> distance = weigh_layers(network);
     provenance_["train_seconds"] = exact(seconds_), provenance_["loss"] = exact(loss_), provenance_["accuracy"] = exact(accuracy_);
     provenance_["created"] = train::utc_now();
-    FigurineFeatures(network, std::move(channel_weights), provenance_).save(request_.output);
+    FigurineFeatures(network, std::move(distance), provenance_).save(request_.output);
     std::error_code ignored;
     std::filesystem::remove(checkpoint(), ignored);
   }

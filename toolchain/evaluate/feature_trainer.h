@@ -3,8 +3,8 @@
 // Every training member is drawn in the same poses from the same cameras; a batch is a shuffled part of these pictures, moved and scaled a
 // little. The loss is the cross-entropy of a softmax over the training members on cosines, with a margin; its class vectors are thrown away
 // in the end. No blur, noise or colour is part of the augmentation: the features must not become blind to what a bad avatar looks like.
-// Then every layer of the perceptual distance gets one weight for all of its channels, so that two different training members in one pose
-// and view are on average 1 apart, each layer with an equal share.
+// Then every layer of the perceptual distance gets a floor of its norm, half the mean of what training pictures have, and one weight for
+// all of its channels, so that two different training members in one pose and view are on average 1 apart, each layer with an equal share.
 //
 // Gradients are made in pieces of eight pictures, each on one thread, and added in the order of the pieces, and everything that is drawn is
 // a function of (seed, iteration, place in the batch): the weights do not depend on the number of threads, and a resumed training goes on

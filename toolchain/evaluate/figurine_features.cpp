@@ -4,7 +4,6 @@
 #include <cstring>
 
 #include "toolchain/error.h"
-#include "toolchain/evaluate/perceptual_embedding.h"
 #include "toolchain/train/random.h"
 #include "toolchain/train/tensor_file.h"
 
@@ -44,6 +43,8 @@ torch::Tensor part(const torch::Tensor& weights, size_t index) {
 }
 
 std::string channel_weights_name(size_t layer) { return "distance." + std::to_string(layer) + ".channel_weight"; }
+
+std::string floor_name(size_t layer) { return "distance." + std::to_string(layer) + ".floor"; }
 
 train::NamedTensor named(const torch::Tensor& tensor, const std::vector<int64_t>& shape) {
   const torch::Tensor values = tensor.contiguous();
@@ -105,9 +106,8 @@ torch::Tensor prepare_for_features(const RgbView& picture) {
   return at::_upsample_bilinear2d_aa(given, {kFeatureSide_px, kFeatureSide_px}, false);
 }
 
-FigurineFeatures::FigurineFeatures(torch::Tensor weights, std::vector<torch::Tensor> channel_weights,
-                                   std::map<std::string, std::string> provenance)
-    : weights_(std::move(weights)), channel_weights_(std::move(channel_weights)), provenance_(std::move(provenance)) {}
+FigurineFeatures::FigurineFeatures(torch::Tensor weights, std::vector<LayerWeights> distance, std::map<std::string, std::string> provenance)
+    : weights_(std::move(weights)), distance_(std::move(distance)), provenance_(std::move(provenance)) {}
 
 FigurineFeatures FigurineFeatures::load(const std::string& path) {
   const train::TensorFile file = train::read_tensor_file(path);
@@ -121,15 +121,17 @@ FigurineFeatures FigurineFeatures::load(const std::string& path) {
     const std::vector<float> values = values_of(file, path, parameter.name, parameter.shape);
     std::memcpy(weights.data_ptr<float>() + parameter.begin, values.data(), values.size() * sizeof(float));
   }
-  std::vector<torch::Tensor> channel_weights;
+  std::vector<LayerWeights> distance;
   for (size_t l = 0; l < kFeatureLayers; ++l) {
     const std::vector<float> values = values_of(file, path, channel_weights_name(l), {kFeatureStages[l].out});
     for (const float weight : values) {
       if (weight < 0) throw InputError(path + ": " + channel_weights_name(l) + ": holds a negative weight");
     }
-    channel_weights.push_back(torch::tensor(values));
+    const float floor = values_of(file, path, floor_name(l), {1})[0];
+    if (!(floor > 0)) throw InputError(path + ": " + floor_name(l) + ": is not above 0");
+    distance.push_back({torch::tensor(values), floor});
   }
-  FigurineFeatures network(weights, std::move(channel_weights), file.metadata);
+  FigurineFeatures network(weights, std::move(distance), file.metadata);
   network.provenance_.erase("format");
   network.file_ = path, network.hash_ = hash_of_file(path);
   return network;
@@ -142,7 +144,8 @@ void FigurineFeatures::save(const std::string& path) const {
     file.tensors[feature_parameters()[i].name] = named(part(weights_, i), feature_parameters()[i].shape);
   }
   for (size_t l = 0; l < kFeatureLayers; ++l) {
-    file.tensors[channel_weights_name(l)] = named(channel_weights_[l], {kFeatureStages[l].out});
+    file.tensors[channel_weights_name(l)] = named(distance_[l].channels, {kFeatureStages[l].out});
+    file.tensors[floor_name(l)] = {{1}, {static_cast<float>(distance_[l].floor)}};
   }
   train::write_tensor_file(path, file);
 }
@@ -169,7 +172,7 @@ void FigurineFeatures::features_of(const RgbView& picture, std::span<double> fea
 
 std::vector<float> FigurineFeatures::embedding_of(const RgbView& picture) const {
   const torch::NoGradGuard no_gradient;
-  return perceptual_embedding(run_feature_network(weights_, prepare_for_features(picture)).activations, channel_weights_);
+  return perceptual_embedding(run_feature_network(weights_, prepare_for_features(picture)).activations, distance_);
 }
 
 }  // namespace figurine::evaluate

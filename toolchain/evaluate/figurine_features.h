@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "toolchain/evaluate/feature_network.h"
+#include "toolchain/evaluate/perceptual_embedding.h"
 
 namespace figurine::evaluate {
 
@@ -53,8 +54,8 @@ torch::Tensor prepare_for_features(const RgbView& picture);
 
 class FigurineFeatures : public FeatureNetwork, public PerceptualNetwork {
  public:
-  // channel_weights: [C] of every layer. provenance: as the file's metadata.
-  FigurineFeatures(torch::Tensor weights, std::vector<torch::Tensor> channel_weights, std::map<std::string, std::string> provenance);
+  // distance: of every layer. provenance: as the file's metadata.
+  FigurineFeatures(torch::Tensor weights, std::vector<LayerWeights> distance, std::map<std::string, std::string> provenance);
   // Throws InputError naming file, tensor and reason.
   static FigurineFeatures load(const std::string& path);
   void save(const std::string& path) const;
@@ -68,8 +69,8 @@ class FigurineFeatures : public FeatureNetwork, public PerceptualNetwork {
   void features_of(const RgbView& picture, std::span<double> features) const override;
   std::vector<float> embedding_of(const RgbView& picture) const override;
 
-  torch::Tensor weights_;                       // [P]
-  std::vector<torch::Tensor> channel_weights_;  // of the layers
+  torch::Tensor weights_;               // [P]
+  std::vector<LayerWeights> distance_;  // of the layers
   std::map<std::string, std::string> provenance_;
   std::string file_, hash_;
 };

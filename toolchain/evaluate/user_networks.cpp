@@ -93,8 +93,9 @@ std::string file_name(const std::string& path) { return std::filesystem::path(pa
 
 struct LpipsAlex::Weights {
   std::string name, file, hash;
-  std::vector<torch::Tensor> weight, bias, channel;  // of the layers
-  torch::Tensor shift, scale;                        // [1,3,1,1]
+  std::vector<torch::Tensor> weight, bias;  // of the layers
+  std::vector<LayerWeights> distance;       // of the layers
+  torch::Tensor shift, scale;               // [1,3,1,1]
 };
 
 LpipsAlex::LpipsAlex(std::unique_ptr<Weights> weights) : weights_(std::move(weights)) {}
@@ -118,7 +119,7 @@ LpipsAlex LpipsAlex::load(const std::string& path) {
     if (channel.min().item<float>() < 0) {
       throw InputError(path + ": " + channel_weights_name(l) + ": holds a negative weight, which LPIPS cannot have");
     }
-    weights->channel.push_back(channel.view({layer.out}));
+    weights->distance.push_back({.channels = channel.view({layer.out})});
   }
   return LpipsAlex(std::move(weights));
 }
@@ -140,7 +141,7 @@ std::vector<float> LpipsAlex::embedding_of(const RgbView& picture) const {
     x = torch::relu(torch::conv2d(x, weights_->weight[l], weights_->bias[l], kAlexNet[l].stride, kAlexNet[l].padding));
     activations.push_back(x);
   }
-  return perceptual_embedding(activations, weights_->channel);
+  return perceptual_embedding(activations, weights_->distance);
 }
 
 struct InceptionFeatures::Script {

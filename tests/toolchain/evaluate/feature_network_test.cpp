@@ -20,9 +20,9 @@ namespace {
 using test::input_error;
 using test::rectangles;
 
-std::vector<torch::Tensor> equal_weights() {
-  std::vector<torch::Tensor> weights;
-  for (const FeatureStage& stage : kFeatureStages) weights.push_back(torch::full({stage.out}, 0.25f));
+std::vector<LayerWeights> equal_weights() {
+  std::vector<LayerWeights> weights;
+  for (const FeatureStage& stage : kFeatureStages) weights.push_back({torch::full({stage.out}, 0.25f), 0.75});
   return weights;
 }
 
@@ -111,7 +111,7 @@ TEST(FigurineFeatures, DistanceIsThatOfTheStages) {
       for (int64_t c = 0; c < channels; ++c)
         xx += x[c * positions + p] * x[c * positions + p], yy += y[c * positions + p] * y[c * positions + p];
       for (int64_t c = 0; c < channels; ++c) {
-        const double d = x[c * positions + p] / (std::sqrt(xx) + 1e-10) - y[c * positions + p] / (std::sqrt(yy) + 1e-10);
+        const double d = x[c * positions + p] / (std::sqrt(xx) + 0.75) - y[c * positions + p] / (std::sqrt(yy) + 0.75);
         expected += 0.25 * d * d / static_cast<double>(positions);
       }
     }
@@ -216,6 +216,8 @@ TEST(FigurineFeatures, RefusesUnsoundFiles) {
   EXPECT_NE(refusal([](auto& file) {
               file.tensors["distance.1.channel_weight"].values[0] = -1;
             }).find("distance.1.channel_weight: holds a negative weight"),
+            std::string::npos);
+  EXPECT_NE(refusal([](auto& file) { file.tensors["distance.0.floor"].values[0] = 0; }).find("distance.0.floor: is not above 0"),
             std::string::npos);
   EXPECT_NE(input_error([&] { FigurineFeatures::load(folder / "none"); }).find("none"), std::string::npos);
   EXPECT_TRUE(open_networks({}).features.empty());
