@@ -11,6 +11,7 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/generation.h"
+#include "toolchain/evaluate/retrieval.h"
 #include "toolchain/generate/sampler_trainer.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
@@ -27,6 +28,7 @@ struct GenerationArguments {
   std::vector<std::string> runs;
   verify::DrawOptions draw;
   evaluate::GenerationOptions options;
+  evaluate::NetworkFiles networks;
   size_t rank = 64;
   uint32_t threads = 1;
   bool quiet = false;
@@ -63,6 +65,28 @@ void print_rows(const nlohmann::json& rows) {
   }
 }
 
+// What a network says of the rows, of what it has: a perceptual distance, features.
+void print_rows_through(const std::string& network, const nlohmann::json& rows) {
+  const auto find = [&](const nlohmann::json& part, const char* kind) {
+    return part.contains(kind) && part.at(kind).contains(network) ? part.at(kind).at(network) : nlohmann::json(nlohmann::json::object());
+  };
+  const auto value = [](const nlohmann::json& of) { return of.contains("value") ? number(of.at("value")) : NAN; };
+  std::printf("\n%s\n%-38s %27s %10s %11s %9s %27s\n", network.c_str(), "", "held out: MMD, COV, 1-NNA", "KID", "Frechet", "train KID",
+              "copies, ratio");
+  for (const nlohmann::json& row : rows) {
+    const nlohmann::json none = nlohmann::json::object();
+    const nlohmann::json &held_out = row.contains("held_out") ? row.at("held_out") : none,
+                         &train = row.contains("train") ? row.at("train") : none,
+                         &novelty = row.contains("novelty") ? row.at("novelty") : none;
+    const nlohmann::json near = find(held_out, "perceptual"), copies = find(novelty, "perceptual");
+    std::printf("%-38s %9.3f %6.1f %% %6.1f %% %10.4f %11.3f %9.4f", row.at("name").get<std::string>().c_str(),
+                value(near.value("mmd", none)), value(near.value("coverage_percent", none)), value(near.value("one_nna_percent", none)),
+                value(find(held_out, "kid")), value(find(held_out, "frechet")), value(find(train, "kid")));
+    if (!copies.empty()) std::printf(" %18.0f %% %6.2f", 100 * number(copies.at("copy_share")), number(copies.at("median_ratio")));
+    std::printf("\n");
+  }
+}
+
 // "NAME=RUN", or RUN alone, which is then called as its folder is.
 std::pair<std::string, std::string> named_run(const std::string& text) {
   const size_t equals = text.find('=');
@@ -72,8 +96,11 @@ std::pair<std::string, std::string> named_run(const std::string& text) {
 
 void run_generation(const GenerationArguments& arguments) {
   train::use_threads(arguments.threads);
+  evaluate::GenerationOptions options = arguments.options;
+  options.networks = evaluate::open_networks(arguments.networks), options.threads = arguments.threads;
   const train::PackageFile population = train::open_package(arguments.population, PackageKind::kPopulation);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
+  const nlohmann::json networks = evaluate::describe_networks(options.networks, population.package);
   const evaluate::MemberSet set(population.package, body.package, {.threads = arguments.threads, .quiet = arguments.quiet});
   std::vector<evaluate::Generated> generated;
   nlohmann::json runs = nlohmann::json::array();
@@ -100,8 +127,12 @@ void run_generation(const GenerationArguments& arguments) {
   report["evaluations"] = arguments.draw.steps;
   report["noised_members_db"] = noised_db;
   report["runs"] = runs;
-  report.update(evaluate::evaluate_generation(set, generated, arguments.options));
-  if (!arguments.quiet) print_rows(report.at("rows"));
+  report["networks"] = networks;
+  report.update(evaluate::evaluate_generation(set, generated, options));
+  if (!arguments.quiet) {
+    print_rows(report.at("rows"));
+    for (const auto& [name, network] : networks.items()) print_rows_through(name, report.at("rows"));
+  }
   if (!arguments.output.empty()) train::write_json(arguments.output, report);
 }
 
@@ -141,6 +172,10 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
   command->add_option("--population", arguments->population, "Population that the samplers learnt from")->required();
   command->add_option("--body", arguments->body, "Body that its members stand on")->required();
   command->add_option("--run", arguments->runs, "NAME=RUN of figurine-train sampler; may be given several times");
+  command->add_option("--features", arguments->networks.features,
+                      "figurine-features (figurine-train features), to compare pictures by too");
+  command->add_option("--lpips", arguments->networks.lpips, "AlexNet with LPIPS' weights, .npz or TorchScript (docs/features.md)");
+  command->add_option("--inception", arguments->networks.inception, "Inception for FID and KID, TorchScript (docs/features.md)");
   command->add_option("--steps", arguments->draw.steps, "Evaluations of a sample (default 20)")
       ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
   command->add_option("--first-seed", arguments->draw.first_seed, "Of the samples, counted up (default 0)");

@@ -8,8 +8,11 @@
 #include "toolchain/error.h"
 #include "toolchain/evaluate/bootstrap.h"
 #include "toolchain/evaluate/compared_pictures.h"
+#include "toolchain/evaluate/comparison_report.h"
 #include "toolchain/evaluate/generation_baselines.h"
+#include "toolchain/evaluate/generation_networks.h"
 #include "toolchain/evaluate/novelty.h"
+#include "toolchain/evaluate/people_distances.h"
 #include "toolchain/evaluate/sample_metrics.h"
 #include "toolchain/evaluate/statistics.h"
 
@@ -20,10 +23,6 @@ namespace {
 constexpr size_t kMostAveraged = 5;
 constexpr size_t kNoisedTried = 12;  // members that the level of noise is matched on
 
-nlohmann::json finite(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
-
-using MemberPictures = std::vector<std::vector<Picture>>;  // [M] of kComparedShots
-
 // A person of standardised weights, drawn. All else is the first training member's, which the others share.
 std::vector<Picture> draw_row(const MemberSet& set, const RowVector& z) {
   const OpenedMember like(set.population(), set.training.front());
@@ -32,21 +31,21 @@ std::vector<Picture> draw_row(const MemberSet& set, const RowVector& z) {
   return set.draw(with_weights(like.avatar, {weights.data(), storage.size()}, storage));
 }
 
-MemberPictures draw_rows(const MemberSet& set, const std::string& name, const RowMatrix& z) {
-  MemberPictures pictures(static_cast<size_t>(z.rows()));
+People draw_rows(const MemberSet& set, const std::string& name, const RowMatrix& z) {
+  People pictures(static_cast<size_t>(z.rows()));
   set.crew.run("drawing " + name, pictures.size(), [&](size_t i) { pictures[i] = draw_row(set, z.row(static_cast<Eigen::Index>(i))); });
   return pictures;
 }
 
-MemberPictures pictures_of(const MemberSet& set, const std::vector<size_t>& members) {
-  MemberPictures pictures;
+People pictures_of(const MemberSet& set, const std::vector<size_t>& members) {
+  People pictures;
   for (const size_t member : members) pictures.push_back(set.pictures[member]);
   return pictures;
 }
 
 // Mean squared errors of all pairs, over both foregrounds: [A,B].
-RowMatrix errors_between(const MemberSet& set, const std::string& what, const MemberPictures& a, const MemberPictures& b) {
-  MemberPictures all = a;
+RowMatrix errors_between(const MemberSet& set, const std::string& what, const People& a, const People& b) {
+  People all = a;
   all.insert(all.end(), b.begin(), b.end());
   const ComparedPictures compared(all);
   RowMatrix mse(static_cast<Eigen::Index>(a.size()), static_cast<Eigen::Index>(b.size()));
@@ -59,7 +58,7 @@ RowMatrix errors_between(const MemberSet& set, const std::string& what, const Me
 }
 
 // The same of one set: symmetric, zeros on the diagonal.
-RowMatrix errors_within(const MemberSet& set, const std::string& what, const MemberPictures& a) {
+RowMatrix errors_within(const MemberSet& set, const std::string& what, const People& a) {
   const ComparedPictures compared(a);
   RowMatrix mse = RowMatrix::Zero(static_cast<Eigen::Index>(a.size()), static_cast<Eigen::Index>(a.size()));
   set.crew.run("comparing " + what, a.size(), [&](size_t i) {
@@ -70,7 +69,7 @@ RowMatrix errors_within(const MemberSet& set, const std::string& what, const Mem
   return mse;
 }
 
-double sharpness(const MemberPictures& people) {
+double sharpness(const People& people) {
   double energy = 0, pixels = 0;
   for (const std::vector<Picture>& pictures : people) {
     for (const Picture& picture : pictures) {
@@ -81,32 +80,13 @@ double sharpness(const MemberPictures& people) {
   return pixels > 0 ? energy / pixels : 0;
 }
 
-nlohmann::json to_json(const BootstrapInterval& interval) {
-  return {{"value", finite(interval.estimate)}, {"low", finite(interval.low)}, {"high", finite(interval.high)}};
-}
-
-nlohmann::json compare(RowMatrix to_references, RowMatrix samples, RowMatrix references, const GenerationOptions& options) {
+nlohmann::json compare(RowMatrix to_references, RowMatrix samples, RowMatrix references, const BootstrapOptions& bootstrap) {
   const SampleComparison comparison({std::move(to_references), std::move(samples), std::move(references)});
-  const BootstrapOptions bootstrap{.replicates = options.replicates, .seed = options.seed};
-  const auto interval = [&](const auto& statistic) {
-    return bootstrap_interval(comparison.size(), comparison.size(), statistic, bootstrap);
-  };
-  const BootstrapInterval nna = interval([&](const Items& items) { return comparison.one_nna_percent(items); });
-  return {{"count", comparison.size()},
-          {"mmd_psnr_db", to_json(interval([&](const Items& items) { return comparison.mmd_psnr_db(items); }))},
-          {"coverage_percent", to_json(interval([&](const Items& items) { return comparison.coverage_percent(items); }))},
-          {"one_nna_percent", to_json(nna)},
-          {"one_nna_off_ideal", std::abs(nna.estimate - 50)}};
-}
-
-nlohmann::json describe(const Novelty& novelty) {
-  std::vector<double> distances;
-  for (const NearestMember& nearest : novelty.samples) distances.push_back(nearest.distance);
-  return {{"median_nearest", quantile(distances, 0.5)},
-          {"median_ratio", finite(novelty.median_ratio)},
-          {"copy_distance", novelty.copy_distance},
-          {"copy_share", novelty.copy_share},
-          {"members_met", novelty.members_met}};
+  nlohmann::json compared = describe_nearest(comparison, bootstrap);
+  compared["count"] = comparison.size();
+  compared["mmd_psnr_db"] = to_json(bootstrap_interval(
+      comparison.size(), comparison.size(), [&](const Items& items) { return comparison.mmd_psnr_db(items); }, bootstrap));
+  return compared;
 }
 
 nlohmann::json describe(const std::vector<BlendShare>& blends) {
@@ -119,7 +99,7 @@ nlohmann::json describe(const std::vector<BlendShare>& blends) {
 
 // What every row is held against.
 struct References {
-  MemberPictures training, held_out;
+  People training, held_out;
   RowMatrix training_mse, held_out_mse, training_distances;
   double training_sharpness = 0;
 
@@ -132,7 +112,7 @@ struct References {
         training_sharpness(sharpness(training)) {}
 };
 
-nlohmann::json audit(const MemberSet& set, const References& references, const RowMatrix& z, const MemberPictures& pictures,
+nlohmann::json audit(const MemberSet& set, const References& references, const RowMatrix& z, const People& pictures,
                      const RowMatrix& to_training_mse) {
   const Novelty weights = measure_novelty(rms_distances(z, set.training_z, set.standardisation.varying()), references.training_distances);
   const Novelty seen = measure_novelty(to_training_mse, references.training_mse);
@@ -144,20 +124,23 @@ nlohmann::json audit(const MemberSet& set, const References& references, const R
           {"highpass_ratio", sharpness(pictures) / references.training_sharpness}};
 }
 
-nlohmann::json evaluate_row(const MemberSet& set, const References& references, const Generated& generated,
-                            const GenerationOptions& options) {
+BootstrapOptions bootstrap_of(const GenerationOptions& options) { return {.replicates = options.replicates, .seed = options.seed}; }
+
+nlohmann::json evaluate_row(const MemberSet& set, const References& references, const GenerationNetworks& networks,
+                            const Generated& generated, const BootstrapOptions& bootstrap) {
   const auto training = static_cast<Eigen::Index>(references.training.size()),
              held_out = static_cast<Eigen::Index>(references.held_out.size());
-  const RowMatrix z = generated.z.topRows(std::max(training, std::min(held_out, generated.z.rows())));
-  const MemberPictures pictures = draw_rows(set, generated.name, z);
+  const RowMatrix z = generated.z.topRows(training);
+  const People pictures = draw_rows(set, generated.name, z);
   const RowMatrix to_training = errors_between(set, generated.name + ", training", pictures, references.training);
   const RowMatrix to_held_out = errors_between(set, generated.name + ", held-out", pictures, references.held_out);
   const RowMatrix within = errors_within(set, generated.name, pictures);
   nlohmann::json row = audit(set, references, z, pictures, to_training);
   row["name"] = generated.name;
   row["samples"] = z.rows();
-  row["held_out"] = compare(to_held_out.topRows(held_out), within.topLeftCorner(held_out, held_out), references.held_out_mse, options);
-  row["train"] = compare(to_training.topRows(training), within.topLeftCorner(training, training), references.training_mse, options);
+  row["held_out"] = compare(to_held_out.topRows(held_out), within.topLeftCorner(held_out, held_out), references.held_out_mse, bootstrap);
+  row["train"] = compare(to_training.topRows(training), within.topLeftCorner(training, training), references.training_mse, bootstrap);
+  networks.add_samples(pictures, row);
   return row;
 }
 
@@ -216,23 +199,30 @@ std::vector<Generated> make_baselines(const MemberSet& set, size_t rank, double 
 
 nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Generated>& generated, const GenerationOptions& options) {
   if (set.held_out.size() < 2) throw InputError("population '" + set.population().name + "': has fewer than two held-out members");
+  if (set.held_out.size() > set.training.size()) {
+    throw InputError("population '" + set.population().name + "': has more held-out members than training ones");
+  }
   const References references(set);
+  const BootstrapOptions bootstrap = bootstrap_of(options);
+  const GenerationNetworks networks(options.networks, references.training, references.held_out, set.crew, options.threads, bootstrap);
   nlohmann::json rows = nlohmann::json::array();
   for (const Generated& one : generated) {
     if (one.z.rows() < static_cast<Eigen::Index>(set.training.size())) throw InputError(one.name + ": fewer samples than training members");
-    rows.push_back(evaluate_row(set, references, one, options));
+    rows.push_back(evaluate_row(set, references, networks, one, bootstrap));
   }
   const RowMatrix to_training = errors_between(set, "held-out members", references.held_out, references.training);
   nlohmann::json held_out = audit(set, references, set.held_out_z, references.held_out, to_training);
   held_out["name"] = "held-out members";
   held_out["samples"] = set.held_out.size();
+  networks.add_held_out_novelty(held_out);
   // Training members as if they had been sampled: what "within 1 dB of training members" is measured from.
   const auto count = static_cast<Eigen::Index>(std::min(set.held_out.size(), set.training.size()));
   const RowMatrix as_samples = to_training.transpose().topRows(count).leftCols(count);
   nlohmann::json members{{"name", "training members"},
                          {"samples", count},
                          {"held_out", compare(as_samples, references.training_mse.topLeftCorner(count, count),
-                                              references.held_out_mse.topLeftCorner(count, count), options)}};
+                                              references.held_out_mse.topLeftCorner(count, count), bootstrap)}};
+  networks.add_training_as_samples(members);
   rows.push_back(std::move(members));
   rows.push_back(std::move(held_out));
   return {{"population", set.population().name},

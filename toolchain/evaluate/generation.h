@@ -1,6 +1,7 @@
 // How a generator's people compare with people that it has seen and with people that it has not (docs/numerics.md, "Generation"): MMD, COV
 // and 1-NNA of pictures, the novelty audit in weights and in pictures, and sharpness, for trained samplers and for the rows that they have
-// to beat. Pictures are the device renderer's in a population's common poses and views; references are renders of trained avatars.
+// to beat; the same in the distance and the features of networks where there are any. Pictures are the device renderer's in a population's
+// common poses and views; references are renders of trained avatars.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "toolchain/evaluate/feature_network.h"
 #include "toolchain/evaluate/member_set.h"
 
 namespace figurine::evaluate {
@@ -25,10 +27,13 @@ std::vector<Generated> make_baselines(const MemberSet& set, size_t rank, double 
 struct GenerationOptions {
   size_t replicates = 1000;  // of the bootstrap
   uint64_t seed = 0;
+  ComparingNetworks networks;  // by which pictures are compared besides PSNR
+  uint32_t threads = 1;        // of the networks
 };
 
 // "references": what the sets are; "rows": one for each of the generated, and one of the held-out members themselves for the audit and
-// sharpness. Throws InputError if there are no held-out members, or Interrupted.
+// sharpness. Throws InputError if there are fewer than two held-out members or more than training ones, or if a network cannot take the
+// pictures; or Interrupted.
 nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Generated>& generated, const GenerationOptions& options);
 
 // Median PSNR of rows' pictures to the nearest training member's: what `noised_db` is matched to.

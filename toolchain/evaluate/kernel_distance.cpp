@@ -1,5 +1,6 @@
 #include "toolchain/evaluate/kernel_distance.h"
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,30 @@ double mean_of_different(const RowMatrix& a) {
 }
 
 double estimate(const RowMatrix& a, const RowMatrix& b) { return mean_of_different(a) + mean_of_different(b) - 2 * kernel(a, b).mean(); }
+
+// Means of V x V blocks.
+RowMatrix kernel_of_people(const RowMatrix& a, const RowMatrix& b, size_t pictures) {
+  const RowMatrix of_pictures = kernel(a, b);
+  const auto v = static_cast<Eigen::Index>(pictures);
+  RowMatrix people(of_pictures.rows() / v, of_pictures.cols() / v);
+  for (Eigen::Index i = 0; i < people.rows(); ++i) {
+    for (Eigen::Index j = 0; j < people.cols(); ++j) people(i, j) = of_pictures.block(i * v, j * v, v, v).mean();
+  }
+  return people;
+}
+
+double mean_of_different(const RowMatrix& kernels, const std::vector<size_t>& people) {
+  double sum = 0;
+  size_t pairs = 0;
+  for (const size_t a : people) {
+    for (const size_t b : people) {
+      if (a == b) continue;
+      sum += kernels(Eigen::Index(a), Eigen::Index(b));
+      ++pairs;
+    }
+  }
+  return pairs == 0 ? std::numeric_limits<double>::quiet_NaN() : sum / static_cast<double>(pairs);
+}
 
 RowMatrix rows_of(const RowMatrix& set, const std::vector<size_t>& rows) {
   RowMatrix chosen(Eigen::Index(rows.size()), set.cols());
@@ -60,6 +85,26 @@ KernelDistance kernel_distance(const RowMatrix& a, const RowMatrix& b, const Ker
   }
   const Summary summary = summarise(values);
   return {summary.mean, summary.standard_deviation};
+}
+
+KernelComparison::KernelComparison(const RowMatrix& samples, const RowMatrix& references, size_t pictures) {
+  check(samples, references);
+  const auto v = static_cast<Eigen::Index>(pictures);
+  if (v < 1 || samples.rows() % v != 0 || references.rows() % v != 0 || samples.rows() < 2 * v || references.rows() < 2 * v) {
+    throw InputError("features: at least two people in each set are needed, of " + std::to_string(pictures) + " pictures each");
+  }
+  between_ = kernel_of_people(samples, references, pictures);
+  samples_ = kernel_of_people(samples, samples, pictures);
+  references_ = kernel_of_people(references, references, pictures);
+}
+
+double KernelComparison::distance(const Items& items) const {
+  double between = 0;
+  for (const size_t s : items.samples) {
+    for (const size_t r : items.references) between += between_(Eigen::Index(s), Eigen::Index(r));
+  }
+  between /= static_cast<double>(items.samples.size() * items.references.size());
+  return mean_of_different(samples_, items.samples) + mean_of_different(references_, items.references) - 2 * between;
 }
 
 }  // namespace figurine::evaluate

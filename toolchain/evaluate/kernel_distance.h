@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "toolchain/evaluate/bootstrap.h"
 #include "toolchain/evaluate/weight_space.h"
 
 namespace figurine::evaluate {
@@ -31,5 +32,23 @@ struct KernelDistance {
 };
 // Over random subsets without repetition, subset i from (seed, i) alone. Throws InputError also for no subset, or one larger than a set.
 KernelDistance kernel_distance(const RowMatrix& a, const RowMatrix& b, const KernelSubsets& subsets);
+
+// The same of people who have V pictures each. Pictures of one person are no independent draws, least of all in features that are to know
+// a person in any pose: their pairs within a set would make few people look far apart, in KID's estimate too. Here the kernel of two people
+// is the mean over their V^2 pairs of pictures, and no person is compared with itself. V = 1: kernel_distance.
+class KernelComparison {
+ public:
+  // samples: [S V, F], references: [R V, F], person by person. Throws InputError below two people in a set, if the sizes do not fit, or for
+  // values that are not finite.
+  KernelComparison(const RowMatrix& samples, const RowMatrix& references, size_t pictures);
+
+  Items all() const { return all_items(size_t(samples_.rows()), size_t(references_.rows())); }
+  // Of a list of people in which some may stand several times (a bootstrap's): no pair is one of a person and its own copy. NaN if a set is
+  // one person's copies.
+  double distance(const Items& items) const;
+
+ private:
+  RowMatrix between_, samples_, references_;  // [S,R], [S,S], [R,R]: kernels of people
+};
 
 }  // namespace figurine::evaluate

@@ -151,6 +151,13 @@ nlohmann::json measure(const Sitting& sitting, const ComparingNetworks& networks
           {"distance", std::move(distance)}};
 }
 
+std::vector<size_t> held_out_members(const Population& population) {
+  std::vector<size_t> members = members_of(population, Split::kValidation);
+  const std::vector<size_t> test = members_of(population, Split::kTest);
+  members.insert(members.end(), test.begin(), test.end());
+  return members;
+}
+
 // Provenance proves that nobody learnt from whom it is judged by.
 void check_not_learnt_from(const nlohmann::json& network, const Package& population, const std::vector<size_t>& held_out) {
   const nlohmann::json provenance = network.value("provenance", nlohmann::json::object());
@@ -207,20 +214,24 @@ RgbPictures noisy(const RgbPictures& pictures, double deviation, uint64_t seed) 
   return out;
 }
 
+nlohmann::json describe_networks(const ComparingNetworks& networks, const Package& population) {
+  nlohmann::json described = nlohmann::json::object();
+  for (const auto& network : networks.features) described[network->name()] = network->describe();
+  for (const auto& network : networks.perceptual) described[network->name()] = network->describe();
+  for (const nlohmann::json& network : described) check_not_learnt_from(network, population, held_out_members(population.population()));
+  return described;
+}
+
 nlohmann::json evaluate_networks(const Package& population, const Package& body, const ComparingNetworks& networks,
                                  const RetrievalOptions& options) {
   const Population& people = population.population();
-  std::vector<size_t> held_out = members_of(people, Split::kValidation), training = members_of(people, Split::kTrain);
-  const std::vector<size_t> test = members_of(people, Split::kTest);
-  held_out.insert(held_out.end(), test.begin(), test.end());
+  const std::vector<size_t> held_out = held_out_members(people);
+  std::vector<size_t> training = members_of(people, Split::kTrain);
   if (held_out.size() < 2) {
     throw InputError("population '" + people.name + "': has " + std::to_string(held_out.size()) +
                      " held-out members, at least 2 are needed");
   }
-  nlohmann::json described = nlohmann::json::object();
-  for (const auto& network : networks.features) described[network->name()] = network->describe();
-  for (const auto& network : networks.perceptual) described[network->name()] = network->describe();
-  for (const nlohmann::json& network : described) check_not_learnt_from(network, population, held_out);
+  nlohmann::json described = describe_networks(networks, population);
   const PosedStudio studio(population, body,
                            {.motion = options.motion,
                             .first_pose = options.first_pose,

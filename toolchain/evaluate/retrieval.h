@@ -24,6 +24,9 @@ struct RetrievalOptions {
   bool quiet = false;
 };
 
+// By name, what every network says of itself. Throws InputError if one learnt from a member of this population that is held out.
+nlohmann::json describe_networks(const ComparingNetworks& networks, const Package& population);
+
 // docs/features.md describes the report. Throws InputError if the population has fewer than two held-out members, or if a network learnt
 // from one of them; Interrupted.
 nlohmann::json evaluate_networks(const Package& population, const Package& body, const ComparingNetworks& networks,

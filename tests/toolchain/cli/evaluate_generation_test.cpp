@@ -1,0 +1,97 @@
+// figurine-train evaluate generation, the way a user runs it without a sampler: the rows that need no training, by PSNR alone and through a
+// network as well.
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "gtest/gtest.h"
+#include "samples/program.h"
+#include "toolchain/evaluate/people.h"
+
+namespace figurine::cli {
+namespace {
+
+using tests::ProgramRun;
+using tests::TestFolder;
+
+ProgramRun judge(const TestFolder& folder, const std::string& arguments) {
+  return tests::run_shell(FIGURINE_TRAIN " evaluate generation --body body.fgn --threads 2 --replicates 20 -o report.json " + arguments,
+                          folder);
+}
+
+nlohmann::json report_of(const TestFolder& folder) {
+  std::ifstream file(folder.path("report.json"));
+  return nlohmann::json::parse(file);
+}
+
+const nlohmann::json& row_of(const nlohmann::json& report, const std::string& name) {
+  const nlohmann::json& rows = report.at("rows");
+  return *std::find_if(rows.begin(), rows.end(), [&](const nlohmann::json& row) { return row.at("name") == name; });
+}
+
+TEST(EvaluateGeneration, HoldsRowsAgainstBothPartsThroughANetworkToo) {
+  const TestFolder folder;
+  tests::write_test_packages(folder);
+  evaluate::test::write_people(folder.path("people.fgn"), {.training = 4, .validation = 1, .test = 1});
+  const ProgramRun trained = tests::run_shell(FIGURINE_TRAIN
+                                              " features --threads 2 --iterations 2 --poses 2 --views 2 --batch 8"
+                                              " --population people.fgn --body body.fgn -o f.safetensors",
+                                              folder);
+  ASSERT_EQ(trained.exit_code, 0) << trained.err;
+  const ProgramRun plain = judge(folder, "--population people.fgn");
+  ASSERT_EQ(plain.exit_code, 0) << plain.err;
+  const nlohmann::json without = report_of(folder);
+  EXPECT_EQ(without.at("networks"), nlohmann::json::object());
+  for (const char* word : {"perceptual", "frechet", "kid"}) EXPECT_EQ(without.at("rows").dump().find(word), std::string::npos) << word;
+
+  const ProgramRun run = judge(folder, "--population people.fgn --features f.safetensors");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("figurine-features\n"), std::string::npos) << run.out;
+  const nlohmann::json report = report_of(folder);
+  EXPECT_EQ(report.at("networks").at("figurine-features").at("hash").get<std::string>().size(), 32u);
+  EXPECT_EQ(report.at("rows").size(), 9u) << "two Gaussians, three averages, noise, the memoriser; training and held-out members";
+  for (const nlohmann::json& row : report.at("rows")) {
+    for (const char* part : {"held_out", "train"}) {
+      if (!row.contains(part)) continue;
+      const nlohmann::json& near = row.at(part).at("perceptual").at("figurine-features");
+      for (const char* key : {"mmd", "coverage_percent", "one_nna_percent"}) {
+        for (const char* of : {"value", "low", "high"}) EXPECT_TRUE(near.at(key).at(of).is_number()) << row.at("name") << ' ' << key;
+      }
+      EXPECT_TRUE(near.at("one_nna_off_ideal").is_number());
+      EXPECT_TRUE(row.at(part).at("kid").at("figurine-features").at("value").is_number());
+      EXPECT_EQ(row.at(part).at("frechet").at("figurine-features").at("left_out"),
+                part == std::string("train") ? "24 pictures are too few for 32 features" : "12 pictures are too few for 32 features");
+      for (const char* key : {"mmd_psnr_db", "coverage_percent", "one_nna_percent"}) {
+        EXPECT_EQ(row.at(part).at(key), row_of(without, row.at("name")).at(part).at(key)) << "as without networks";
+      }
+    }
+  }
+  const nlohmann::json& copies = row_of(report, "perfect memoriser").at("novelty").at("perceptual").at("figurine-features");
+  EXPECT_EQ(copies.at("copy_share"), 1);
+  EXPECT_EQ(copies.at("median_ratio"), 0);
+  EXPECT_GT(row_of(report, "held-out members").at("novelty").at("perceptual").at("figurine-features").at("median_ratio"), 0);
+  EXPECT_TRUE(row_of(report, "training members").at("held_out").at("perceptual").contains("figurine-features"));
+  for (const char* word : {"LPIPS", "FID"}) EXPECT_EQ(report.dump().find(word), std::string::npos) << "it is neither";
+}
+
+TEST(EvaluateGeneration, BadInputGivesOneLineAndNoReport) {
+  const TestFolder folder;
+  tests::write_test_packages(folder);
+  evaluate::test::write_people(folder.path("three.fgn"), {.training = 3, .validation = 2, .test = 2});
+  folder.write("text.pt", "no script");
+  const auto refused = [&](const std::string& arguments, const std::string& wanted) {
+    const ProgramRun run = judge(folder, arguments);
+    EXPECT_EQ(run.exit_code, 1) << wanted;
+    EXPECT_EQ(run.error_lines(), 1u) << run.err;
+    EXPECT_NE(run.err.find(wanted), std::string::npos) << run.err;
+    EXPECT_FALSE(folder.has("report.json")) << wanted;
+  };
+  refused("--population none.fgn", "none.fgn");
+  refused("--population three.fgn --features none.safetensors", "none.safetensors");
+  refused("--population three.fgn --lpips text.pt", "text.pt: not a TorchScript file");
+  refused("--population three.fgn --inception text.pt", "text.pt: not a TorchScript file");
+  refused("--population three.fgn", "has more held-out members than training ones");
+}
+
+}  // namespace
+}  // namespace figurine::cli

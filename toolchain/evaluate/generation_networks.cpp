@@ -1,0 +1,105 @@
+#include "toolchain/evaluate/generation_networks.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "figurine/check.h"
+#include "toolchain/evaluate/comparison_report.h"
+#include "toolchain/evaluate/frechet.h"
+#include "toolchain/evaluate/kernel_distance.h"
+#include "toolchain/evaluate/novelty.h"
+#include "toolchain/evaluate/sample_metrics.h"
+
+namespace figurine::evaluate {
+
+namespace {
+
+nlohmann::json describe_frechet(const RowMatrix& samples, const RowMatrix& references) {
+  const auto pictures = static_cast<size_t>(samples.rows()), dimension = static_cast<size_t>(samples.cols());
+  if (pictures < kPicturesPerFeature * dimension) {
+    return {{"left_out", std::to_string(pictures) + " pictures are too few for " + std::to_string(dimension) + " features"}};
+  }
+  return {{"value", finite(frechet_distance(samples, references))}};
+}
+
+}  // namespace
+
+GenerationNetworks::GenerationNetworks(const ComparingNetworks& networks, const People& training, const People& held_out, const Crew& crew,
+                                       uint32_t threads, const BootstrapOptions& bootstrap)
+    : networks_(networks),
+      crew_(crew),
+      threads_(threads),
+      bootstrap_(bootstrap),
+      training_(static_cast<Eigen::Index>(training.size())),
+      held_out_(static_cast<Eigen::Index>(held_out.size())),
+      pictures_(static_cast<Eigen::Index>(training.at(0).size())),
+      references_(training) {
+  references_.insert(references_.end(), held_out.begin(), held_out.end());
+  for (const auto& network : networks.perceptual) {
+    distances_.push_back(measure_distances(*network, references_, {}, crew, threads).within);
+  }
+  for (const auto& network : networks.features) features_.push_back(measure_features(*network, references_, threads));
+}
+
+nlohmann::json GenerationNetworks::compare_distances(RowMatrix to_references, RowMatrix samples, RowMatrix references) const {
+  const SampleComparison comparison({std::move(to_references), std::move(samples), std::move(references)});
+  nlohmann::json compared = describe_nearest(comparison, bootstrap_);
+  compared["mmd"] = to_json(
+      bootstrap_interval(comparison.size(), comparison.size(), [&](const Items& items) { return comparison.mmd(items); }, bootstrap_));
+  return compared;
+}
+
+void GenerationNetworks::compare_features(const FeatureNetwork& network, const RowMatrix& samples, const RowMatrix& references,
+                                          nlohmann::json& part) const {
+  const KernelComparison comparison(samples, references, static_cast<size_t>(pictures_));
+  const Items all = comparison.all();
+  part["kid"][network.name()] = to_json(bootstrap_interval(
+      all.samples.size(), all.references.size(), [&](const Items& items) { return comparison.distance(items); }, bootstrap_));
+  part["frechet"][network.name()] = describe_frechet(samples, references);
+}
+
+void GenerationNetworks::add_samples(const People& samples, nlohmann::json& row) const {
+  const Eigen::Index n = training_, h = held_out_;
+  FIG_CHECK(static_cast<Eigen::Index>(samples.size()) >= std::max(n, h), "as many samples as either part has members");
+  for (size_t i = 0; i < networks_.perceptual.size(); ++i) {
+    const std::string& name = networks_.perceptual[i]->name();
+    const PeopleDistances own = measure_distances(*networks_.perceptual[i], samples, references_, crew_, threads_);
+    const RowMatrix &to = own.to_references, &within = own.within, &references = distances_[i];
+    row["train"]["perceptual"][name] =
+        compare_distances(to.topLeftCorner(n, n), within.topLeftCorner(n, n), references.topLeftCorner(n, n));
+    row["held_out"]["perceptual"][name] =
+        compare_distances(to.block(0, n, h, h), within.topLeftCorner(h, h), references.bottomRightCorner(h, h));
+    row["novelty"]["perceptual"][name] = describe(measure_novelty(to.leftCols(n), references.topLeftCorner(n, n)));
+  }
+  for (size_t i = 0; i < networks_.features.size(); ++i) {
+    const FeatureNetwork& network = *networks_.features[i];
+    const RowMatrix own = measure_features(network, samples, threads_);
+    compare_features(network, own.topRows(n * pictures_), features_[i].topRows(n * pictures_), row["train"]);
+    compare_features(network, own.topRows(h * pictures_), features_[i].bottomRows(h * pictures_), row["held_out"]);
+  }
+}
+
+void GenerationNetworks::add_training_as_samples(nlohmann::json& row) const {
+  const Eigen::Index n = training_, count = std::min(training_, held_out_);
+  for (size_t i = 0; i < networks_.perceptual.size(); ++i) {
+    const RowMatrix& all = distances_[i];
+    row["held_out"]["perceptual"][networks_.perceptual[i]->name()] =
+        compare_distances(all.block(0, n, count, count), all.topLeftCorner(count, count), all.block(n, n, count, count));
+  }
+  for (size_t i = 0; i < networks_.features.size(); ++i) {
+    compare_features(*networks_.features[i], features_[i].topRows(count * pictures_),
+                     features_[i].middleRows(n * pictures_, count * pictures_), row["held_out"]);
+  }
+}
+
+void GenerationNetworks::add_held_out_novelty(nlohmann::json& row) const {
+  const Eigen::Index n = training_, h = held_out_;
+  for (size_t i = 0; i < networks_.perceptual.size(); ++i) {
+    const RowMatrix& all = distances_[i];
+    row["novelty"]["perceptual"][networks_.perceptual[i]->name()] =
+        describe(measure_novelty(all.bottomLeftCorner(h, n), all.topLeftCorner(n, n)));
+  }
+}
+
+}  // namespace figurine::evaluate
