@@ -8,9 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "ports/linux/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/generation.h"
+#include "toolchain/evaluate/member_sheets.h"
 #include "toolchain/evaluate/retrieval.h"
 #include "toolchain/generate/sampler_trainer.h"
 #include "toolchain/train/package_file.h"
@@ -23,8 +25,10 @@ namespace figurine::cli {
 
 namespace {
 
+constexpr size_t kSheetPeople = 16, kSheetBytes = 400'000;
+
 struct GenerationArguments {
-  std::string population, body, output;
+  std::string population, body, output, sheet;
   std::vector<std::string> runs;
   verify::DrawOptions draw;
   evaluate::GenerationOptions options;
@@ -110,7 +114,7 @@ void run_generation(const GenerationArguments& arguments) {
     verify::DrawOptions draw = arguments.draw;
     draw.count = std::max(set.training.size(), set.held_out.size());
     const auto start = std::chrono::steady_clock::now();
-    generated.push_back({name, set.standardisation.standardise(verify::draw_weights(sampler, draw))});
+    generated.push_back({name, set.standardisation.standardise(verify::draw_weights(sampler, draw)), sampler.settings.members});
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const nlohmann::json description = train::read_json(train::RunDirectory{path}.run_json());
     nlohmann::json run{{"name", name}, {"seconds_per_sample", seconds / static_cast<double>(draw.count)}};
@@ -132,6 +136,12 @@ void run_generation(const GenerationArguments& arguments) {
   if (!arguments.quiet) {
     print_rows(report.at("rows"));
     for (const auto& [name, network] : networks.items()) print_rows_through(name, report.at("rows"));
+  }
+  if (!arguments.sheet.empty()) {
+    std::vector<evaluate::RowMatrix> sets;
+    for (const evaluate::Generated& one : generated) sets.push_back(one.z);
+    const ports::ImageU8 sheet = evaluate::draw_people(set, sets, std::min(kSheetPeople, set.training.size()));
+    throw_if_error(ports::write_file_atomically(arguments.sheet, evaluate::encode_sheet(sheet, kSheetBytes)), "cannot save");
   }
   if (!arguments.output.empty()) train::write_json(arguments.output, report);
 }
@@ -184,6 +194,7 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
   command->add_option("--seed", arguments->options.seed, "Of baselines and bootstrap (default 0)");
   command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));
   command->add_flag("--quiet", arguments->quiet, "No progress, no table");
+  command->add_option("--sheet", arguments->sheet, "Picture to write, JPEG: the first 16 people of every row, in the table's order");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");
   command->callback([arguments] { run_generation(*arguments); });
 }

@@ -113,14 +113,16 @@ struct References {
 };
 
 nlohmann::json audit(const MemberSet& set, const References& references, const RowMatrix& z, const People& pictures,
-                     const RowMatrix& to_training_mse) {
-  const Novelty weights = measure_novelty(rms_distances(z, set.training_z, set.standardisation.varying()), references.training_distances);
-  const Novelty seen = measure_novelty(to_training_mse, references.training_mse);
+                     const RowMatrix& to_training_mse, Eigen::Index learnt) {
+  const RowMatrix learnt_z = set.training_z.topRows(learnt);
+  const Novelty weights = measure_novelty(rms_distances(z, learnt_z, set.standardisation.varying()),
+                                          references.training_distances.topLeftCorner(learnt, learnt));
+  const Novelty seen = measure_novelty(to_training_mse.leftCols(learnt), references.training_mse.topLeftCorner(learnt, learnt));
   nlohmann::json of_pictures = describe(seen);
   of_pictures["median_nearest_db"] = finite(psnr_db(of_pictures.at("median_nearest").get<double>()));
   of_pictures["copy_distance_db"] = finite(psnr_db(seen.copy_distance));
   return {{"novelty", {{"weights", describe(weights)}, {"pictures", of_pictures}}},
-          {"blends", describe(measure_blends(z, set.training_z))},
+          {"blends", describe(measure_blends(z, learnt_z))},
           {"highpass_ratio", sharpness(pictures) / references.training_sharpness}};
 }
 
@@ -135,12 +137,14 @@ nlohmann::json evaluate_row(const MemberSet& set, const References& references, 
   const RowMatrix to_training = errors_between(set, generated.name + ", training", pictures, references.training);
   const RowMatrix to_held_out = errors_between(set, generated.name + ", held-out", pictures, references.held_out);
   const RowMatrix within = errors_within(set, generated.name, pictures);
-  nlohmann::json row = audit(set, references, z, pictures, to_training);
+  const auto learnt = generated.learnt > 0 ? static_cast<Eigen::Index>(generated.learnt) : training;
+  nlohmann::json row = audit(set, references, z, pictures, to_training, learnt);
   row["name"] = generated.name;
   row["samples"] = z.rows();
+  row["learnt_from"] = learnt;
   row["held_out"] = compare(to_held_out.topRows(held_out), within.topLeftCorner(held_out, held_out), references.held_out_mse, bootstrap);
   row["train"] = compare(to_training.topRows(training), within.topLeftCorner(training, training), references.training_mse, bootstrap);
-  networks.add_samples(pictures, row);
+  networks.add_samples(pictures, learnt, row);
   return row;
 }
 
@@ -208,10 +212,11 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
   nlohmann::json rows = nlohmann::json::array();
   for (const Generated& one : generated) {
     if (one.z.rows() < static_cast<Eigen::Index>(set.training.size())) throw InputError(one.name + ": fewer samples than training members");
+    if (one.learnt == 1 || one.learnt > set.training.size()) throw InputError(one.name + ": learnt from other members than these");
     rows.push_back(evaluate_row(set, references, networks, one, bootstrap));
   }
   const RowMatrix to_training = errors_between(set, "held-out members", references.held_out, references.training);
-  nlohmann::json held_out = audit(set, references, set.held_out_z, references.held_out, to_training);
+  nlohmann::json held_out = audit(set, references, set.held_out_z, references.held_out, to_training, set.training_z.rows());
   held_out["name"] = "held-out members";
   held_out["samples"] = set.held_out.size();
   networks.add_held_out_novelty(held_out);

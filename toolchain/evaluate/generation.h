@@ -17,7 +17,8 @@ namespace figurine::evaluate {
 // People to be judged. A sampler's, or a baseline's.
 struct Generated {
   std::string name;
-  RowMatrix z;  // [S,D] standardised weights, S >= N of the training part
+  RowMatrix z;        // [S,D] standardised weights, S >= N of the training part
+  size_t learnt = 0;  // from the first so many training members, whom the audit looks for; 0: all
 };
 
 // The rows that need no training: a Gaussian in every token's `rank` principal directions, averages of 2 to 5 members, the perfect

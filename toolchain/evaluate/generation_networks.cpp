@@ -59,7 +59,7 @@ void GenerationNetworks::compare_features(const FeatureNetwork& network, const R
   part["frechet"][network.name()] = describe_frechet(samples, references);
 }
 
-void GenerationNetworks::add_samples(const People& samples, nlohmann::json& row) const {
+void GenerationNetworks::add_samples(const People& samples, Eigen::Index learnt, nlohmann::json& row) const {
   const Eigen::Index n = training_, h = held_out_;
   FIG_CHECK(static_cast<Eigen::Index>(samples.size()) >= std::max(n, h), "as many samples as either part has members");
   for (size_t i = 0; i < networks_.perceptual.size(); ++i) {
@@ -70,7 +70,7 @@ void GenerationNetworks::add_samples(const People& samples, nlohmann::json& row)
         compare_distances(to.topLeftCorner(n, n), within.topLeftCorner(n, n), references.topLeftCorner(n, n));
     row["held_out"]["perceptual"][name] =
         compare_distances(to.block(0, n, h, h), within.topLeftCorner(h, h), references.bottomRightCorner(h, h));
-    row["novelty"]["perceptual"][name] = describe(measure_novelty(to.leftCols(n), references.topLeftCorner(n, n)));
+    row["novelty"]["perceptual"][name] = describe(measure_novelty(to.leftCols(learnt), references.topLeftCorner(learnt, learnt)));
   }
   for (size_t i = 0; i < networks_.features.size(); ++i) {
     const FeatureNetwork& network = *networks_.features[i];

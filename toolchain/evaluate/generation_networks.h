@@ -24,8 +24,8 @@ class GenerationNetworks {
                      const BootstrapOptions& bootstrap);
 
   // Adds to a row's "held_out" and "train" the objects "perceptual", "frechet" and "kid", and to its "novelty" the object "perceptual";
-  // nothing without networks. samples: at least max(N, H).
-  void add_samples(const People& samples, nlohmann::json& row) const;
+  // nothing without networks. samples: at least max(N, H). learnt: the first so many training members, whom the novelty audit looks for.
+  void add_samples(const People& samples, Eigen::Index learnt, nlohmann::json& row) const;
   void add_training_as_samples(nlohmann::json& row) const;  // the first min(N, H), to "held_out"
   void add_held_out_novelty(nlohmann::json& row) const;
 

@@ -166,6 +166,18 @@ ports::ImageU8 draw_close(const MemberSet& set, const std::vector<size_t>& membe
   return tile(rows);
 }
 
+ports::ImageU8 draw_people(const MemberSet& set, const std::vector<RowMatrix>& sets, size_t people) {
+  const OpenedMember like(set.population(), set.training.front());
+  std::vector<std::vector<Picture>> rows(sets.size(), std::vector<Picture>(people));
+  set.crew.run("sheet", sets.size() * people, [&](size_t i) {
+    const RowVector weights = set.standardisation.restore(sets[i / people].row(static_cast<Eigen::Index>(i % people)));
+    std::vector<float> storage(static_cast<size_t>(weights.size()));
+    rows[i / people][i % people] = set.portrait(with_weights(like.avatar, {weights.data(), storage.size()}, storage), kFrontPortrait,
+                                                heights_for(set.population()).wall_px);
+  });
+  return tile(rows);
+}
+
 std::vector<std::byte> encode_sheet(const ports::ImageU8& sheet, size_t max_bytes) {
   std::vector<std::byte> bytes;
   for (int quality = 92; quality >= 60; quality -= 4) {

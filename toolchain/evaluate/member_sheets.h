@@ -18,6 +18,9 @@ ports::ImageU8 draw_mixtures(const MemberSet& set, const std::vector<MixedPair>&
 // The given members in their order, each from the front and from behind.
 ports::ImageU8 draw_close(const MemberSet& set, const std::vector<size_t>& members);
 
+// A row for each set of standardised weights [S,W]: its first `people`, from the front; all else is the first training member's.
+ports::ImageU8 draw_people(const MemberSet& set, const std::vector<RowMatrix>& sets, size_t people);
+
 // Of the best quality (at most 92) that stays below max_bytes, down to 60.
 std::vector<std::byte> encode_sheet(const ports::ImageU8& sheet, size_t max_bytes);
 

@@ -135,7 +135,7 @@ TEST(GenerationNetworks, CopiesAreFoundOut) {
   const ComparingNetworks networks = both();
   const GenerationNetworks judge(networks, training, held_out, crew(), 2, kBootstrap);
   nlohmann::json row;
-  judge.add_samples(training, row);
+  judge.add_samples(training, Eigen::Index(training.size()), row);
   const nlohmann::json& near = row.at("train").at("perceptual").at("pixels");
   EXPECT_EQ(value(near.at("mmd")), 0);
   EXPECT_EQ(value(near.at("coverage_percent")), 100);
@@ -161,13 +161,28 @@ TEST(GenerationNetworks, CopiesAreFoundOut) {
   EXPECT_LT(strangers.at("novelty").at("perceptual").at("pixels").at("copy_share"), 0.5);
 }
 
+// A sampler that learnt from the first four of them is not to be blamed for being like the others.
+TEST(GenerationNetworks, TheAuditLooksForWhomASamplerLearntFrom) {
+  const People training = random_people(8, 4), held_out = random_people(5, 5);
+  const ComparingNetworks networks = both();
+  const GenerationNetworks judge(networks, training, held_out, crew(), 2, kBootstrap);
+  nlohmann::json all, half;
+  judge.add_samples(training, 8, all), judge.add_samples(training, 4, half);
+  const auto audit = [](const nlohmann::json& row) { return row.at("novelty").at("perceptual").at("pixels"); };
+  EXPECT_EQ(audit(all).at("copy_share"), 1);
+  EXPECT_EQ(audit(all).at("members_met"), 8);
+  EXPECT_EQ(audit(half).at("copy_share"), 0.5);
+  EXPECT_EQ(audit(half).at("members_met"), 4);
+  EXPECT_EQ(half.at("train"), all.at("train"));
+}
+
 TEST(GenerationNetworks, TheOrderOfSamplesDoesNotMatter) {
   const People training = random_people(6, 6), held_out = random_people(6, 7), samples = random_people(6, 8);
   const ComparingNetworks networks = both();
   const GenerationNetworks judge(networks, training, held_out, crew(), 2, kBootstrap);
   nlohmann::json row, other_row;
-  judge.add_samples(samples, row);
-  judge.add_samples({samples[4], samples[0], samples[5], samples[2], samples[1], samples[3]}, other_row);
+  judge.add_samples(samples, Eigen::Index(training.size()), row);
+  judge.add_samples({samples[4], samples[0], samples[5], samples[2], samples[1], samples[3]}, Eigen::Index(training.size()), other_row);
   for (const char* part : {"held_out", "train"}) {
     for (const char* key : {"mmd", "coverage_percent", "one_nna_percent"}) {
       EXPECT_NEAR(value(row.at(part).at("perceptual").at("pixels").at(key)),
@@ -194,7 +209,7 @@ TEST(GenerationNetworks, LeaveTheFrechetDistanceOutWherePicturesAreFew) {
   const ComparingNetworks networks = both(6);
   const GenerationNetworks judge(networks, training, held_out, crew(), 2, kBootstrap);
   nlohmann::json row;
-  judge.add_samples(training, row);
+  judge.add_samples(training, Eigen::Index(training.size()), row);
   EXPECT_TRUE(row.at("train").at("frechet").at("colours").contains("value"));
   EXPECT_EQ(row.at("held_out").at("frechet").at("colours"), nlohmann::json({{"left_out", "12 pictures are too few for 6 features"}}));
   EXPECT_TRUE(row.at("held_out").at("kid").at("colours").at("value").is_number());
@@ -205,7 +220,7 @@ TEST(GenerationNetworks, SayNothingWhereThereAreNone) {
   const ComparingNetworks none;
   const GenerationNetworks judge(none, people, people, crew(), 1, kBootstrap);
   nlohmann::json row = nlohmann::json::object();
-  judge.add_samples(people, row), judge.add_training_as_samples(row), judge.add_held_out_novelty(row);
+  judge.add_samples(people, Eigen::Index(people.size()), row), judge.add_training_as_samples(row), judge.add_held_out_novelty(row);
   EXPECT_TRUE(row.empty()) << row;
 }
 

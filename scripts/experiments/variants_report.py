@@ -1,0 +1,47 @@
+"""Puts an ablation's figures together: FOLDER/generation.json and the runs' losses -> docs/results/generation.json and sampler_loss_NAME.csv.
+
+    variants_report.py FOLDER NAME OUTPUT COMMAND RUN...
+
+FOLDER is that of scripts/experiments/variants.sh. Nothing is computed here. Objects of other names in generation.json stay.
+"""
+
+import csv
+import datetime
+import json
+import os
+import pathlib
+import sys
+
+STEP = 500  # iterations between rows of the losses
+
+
+def write(path, text):
+    fresh = path.with_suffix(path.suffix + ".tmp")
+    fresh.write_text(text)
+    os.replace(fresh, path)
+
+
+def main():
+    folder, name, output, command, runs = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), sys.argv[4], sys.argv[5:]
+    report = json.loads((folder / "generation.json").read_text())
+    del report["command"]  # of this machine's folders
+    path = output / "generation.json"
+    generation = json.loads(path.read_text()) if path.exists() else {}
+    generation[name] = {
+        "command": command,
+        "commit": os.environ.get("FIGURINE_COMMIT", "unknown"),
+        "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
+    } | report
+    write(path, json.dumps(generation, indent=2, sort_keys=True) + "\n")
+
+    lines = ["run,iteration,seconds,loss,validation_loss"]
+    for run in runs:
+        with open(folder / run / "log.csv", encoding="utf-8") as log:
+            for row in csv.DictReader(log):
+                if int(row["iteration"]) % STEP == 0:
+                    lines.append(f"{run},{row['iteration']},{float(row['seconds']):.0f},{row['loss']},{row['validation_loss']}")
+    write(output / f"sampler_loss_{name}.csv", "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
