@@ -5,7 +5,8 @@
 #   scripts/experiments/variants.sh nano [FOLDER]        FOLDER (default out/variants) keeps every run
 #
 # May be stopped and killed at any time; called again it goes on. ITERATIONS (default 4000) is each training's budget. Writes the population's
-# object in docs/results/generation.json, the trainings' losses as docs/results/sampler_loss_NAME.csv, and docs/sampler_variants_NAME.jpg.
+# object in docs/results/generation.json, the trainings' losses as docs/results/sampler_loss_NAME.csv, docs/sampler_variants_NAME.jpg and
+# docs/sampler_curves.png.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
@@ -45,3 +46,5 @@ for run in "${runs[@]}"; do options+=(--run "$run=$folder/$run"); done
 train evaluate generation --population "$population" --body "$body" --features "$features" "${options[@]}" --sheet "docs/sampler_variants_$name.jpg" \
   -o "$folder/generation.json"
 scripts/run python3 scripts/experiments/variants_report.py "$folder" "$name" docs/results "scripts/experiments/variants.sh $name" "${runs[@]}"
+scripts/setup plots
+scripts/run python3 scripts/experiments/generation_plots.py docs/results docs/sampler_curves.png

@@ -19,6 +19,7 @@
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"
 #include "toolchain/verify/float_sampler.h"
+#include "toolchain/verify/posterior_entropy.h"
 #include "toolchain/verify/sampling_error.h"
 
 namespace figurine::cli {
@@ -26,6 +27,7 @@ namespace figurine::cli {
 namespace {
 
 constexpr size_t kSheetPeople = 16, kSheetBytes = 400'000;
+constexpr size_t kEntropyLevels = 41, kCopiedSteps = 500;
 
 struct GenerationArguments {
   std::string population, body, output, sheet;
@@ -98,6 +100,23 @@ std::pair<std::string, std::string> named_run(const std::string& text) {
   return {std::filesystem::path(text).filename().string(), text};
 }
 
+// Over the run's schedule, and where the schedule that the paper's model copies begins.
+nlohmann::json describe_entropy(const generate::TrainedSampler& sampler) {
+  const size_t dimension = sampler.space->dimension();
+  std::vector<NoiseLevel> levels(kEntropyLevels), copied(kCopiedSteps + 1);
+  solver_levels(generate::noise_schedule(sampler.settings, dimension), false, levels);
+  linear_beta_levels(copied);
+  levels.push_back(copied.front());
+  const std::vector<double> entropy = verify::posterior_entropy(sampler.training, levels);
+  nlohmann::json rows = nlohmann::json::array();
+  for (size_t l = 0; l < levels.size(); ++l) {
+    rows.push_back({{"dimension_snr", static_cast<double>(dimension) * snr(levels[l])}, {"nats", entropy[l]}});
+  }
+  const nlohmann::json last = rows.back();
+  rows.erase(rows.size() - 1);
+  return {{"undecided_nats", std::log(static_cast<double>(sampler.training.rows()))}, {"levels", rows}, {"linear_beta_500", last}};
+}
+
 void run_generation(const GenerationArguments& arguments) {
   train::use_threads(arguments.threads);
   evaluate::GenerationOptions options = arguments.options;
@@ -121,6 +140,7 @@ void run_generation(const GenerationArguments& arguments) {
     for (const char* key : {"settings", "parameters", "macs_per_evaluation", "iterations", "train_seconds", "loss", "validation_loss"}) {
       if (description.contains(key)) run[key] = description.at(key);
     }
+    run["posterior_entropy"] = describe_entropy(sampler);
     runs.push_back(std::move(run));
   }
   const double noised_db = generated.empty() ? 20 : evaluate::nearest_member_db(set, generated.front());

@@ -208,7 +208,7 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
   }
   const References references(set);
   const BootstrapOptions bootstrap = bootstrap_of(options);
-  const GenerationNetworks networks(options.networks, references.training, references.held_out, set.crew, options.threads, bootstrap);
+  const GenerationNetworks networks(options.networks, references.training, references.held_out, options.threads, bootstrap);
   nlohmann::json rows = nlohmann::json::array();
   for (const Generated& one : generated) {
     if (one.z.rows() < static_cast<Eigen::Index>(set.training.size())) throw InputError(one.name + ": fewer samples than training members");

@@ -25,10 +25,9 @@ nlohmann::json describe_frechet(const RowMatrix& samples, const RowMatrix& refer
 
 }  // namespace
 
-GenerationNetworks::GenerationNetworks(const ComparingNetworks& networks, const People& training, const People& held_out, const Crew& crew,
-                                       uint32_t threads, const BootstrapOptions& bootstrap)
+GenerationNetworks::GenerationNetworks(const ComparingNetworks& networks, const People& training, const People& held_out, uint32_t threads,
+                                       const BootstrapOptions& bootstrap)
     : networks_(networks),
-      crew_(crew),
       threads_(threads),
       bootstrap_(bootstrap),
       training_(static_cast<Eigen::Index>(training.size())),
@@ -37,7 +36,7 @@ GenerationNetworks::GenerationNetworks(const ComparingNetworks& networks, const 
       references_(training) {
   references_.insert(references_.end(), held_out.begin(), held_out.end());
   for (const auto& network : networks.perceptual) {
-    distances_.push_back(measure_distances(*network, references_, {}, crew, threads).within);
+    distances_.push_back(measure_distances(*network, references_, {}, threads).within);
   }
   for (const auto& network : networks.features) features_.push_back(measure_features(*network, references_, threads));
 }
@@ -64,7 +63,7 @@ void GenerationNetworks::add_samples(const People& samples, Eigen::Index learnt,
   FIG_CHECK(static_cast<Eigen::Index>(samples.size()) >= std::max(n, h), "as many samples as either part has members");
   for (size_t i = 0; i < networks_.perceptual.size(); ++i) {
     const std::string& name = networks_.perceptual[i]->name();
-    const PeopleDistances own = measure_distances(*networks_.perceptual[i], samples, references_, crew_, threads_);
+    const PeopleDistances own = measure_distances(*networks_.perceptual[i], samples, references_, threads_);
     const RowMatrix &to = own.to_references, &within = own.within, &references = distances_[i];
     row["train"]["perceptual"][name] =
         compare_distances(to.topLeftCorner(n, n), within.topLeftCorner(n, n), references.topLeftCorner(n, n));

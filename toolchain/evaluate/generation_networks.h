@@ -20,7 +20,7 @@ inline constexpr size_t kPicturesPerFeature = 4;
 class GenerationNetworks {
  public:
   // All is borrowed but the pictures. Throws InputError if a network cannot take the pictures, or Interrupted.
-  GenerationNetworks(const ComparingNetworks& networks, const People& training, const People& held_out, const Crew& crew, uint32_t threads,
+  GenerationNetworks(const ComparingNetworks& networks, const People& training, const People& held_out, uint32_t threads,
                      const BootstrapOptions& bootstrap);
 
   // Adds to a row's "held_out" and "train" the objects "perceptual", "frechet" and "kid", and to its "novelty" the object "perceptual";
@@ -35,7 +35,6 @@ class GenerationNetworks {
   void compare_features(const FeatureNetwork& network, const RowMatrix& samples, const RowMatrix& references, nlohmann::json& part) const;
 
   const ComparingNetworks& networks_;
-  const Crew& crew_;
   uint32_t threads_;
   BootstrapOptions bootstrap_;
   Eigen::Index training_, held_out_, pictures_;  // N, H, V

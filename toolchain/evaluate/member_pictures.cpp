@@ -7,6 +7,7 @@
 
 #include "figurine/check.h"
 #include "toolchain/error.h"
+#include "toolchain/evaluate/widest_vectors.h"
 #include "toolchain/model/parallel.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/verify/device_avatar.h"
@@ -189,6 +190,27 @@ SquaredError union_error(std::span<const Picture> a, std::span<const Picture> b)
   return error;
 }
 
+namespace {
+
+constexpr size_t kRun = 4096;  // as many squares of at most 510^2 stay within 32 bits
+
+FIG_WIDEST_VECTORS uint32_t count_union(const int16_t* mask_a, const int16_t* mask_b, size_t count) {
+  int32_t seen = 0;
+  for (size_t i = 0; i < count; ++i) seen -= mask_a[i] | mask_b[i];
+  return static_cast<uint32_t>(seen);
+}
+
+FIG_WIDEST_VECTORS uint32_t masked_squares(const int16_t* a, const int16_t* b, const int16_t* mask_a, const int16_t* mask_b, size_t count) {
+  int32_t squares = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const auto difference = static_cast<int16_t>((a[i] - b[i]) & (mask_a[i] | mask_b[i]));
+    squares += int32_t(difference) * difference;
+  }
+  return static_cast<uint32_t>(squares);
+}
+
+}  // namespace
+
 ComparedPictures::ComparedPictures(std::span<const std::vector<Picture>> members) {
   std::vector<std::pair<size_t, size_t>> kept;  // picture, pixel
   const size_t pictures = members.empty() ? 0 : members[0].size();
@@ -211,22 +233,13 @@ ComparedPictures::ComparedPictures(std::span<const std::vector<Picture>> members
 }
 
 SquaredError ComparedPictures::error(size_t a, size_t b) const {
-  constexpr size_t kRun = 4096;  // as many squares of at most 510^2 stay within 32 bits
-  const int16_t* mask[2] = {&foreground_[a * pixels_], &foreground_[b * pixels_]};
   uint64_t sum = 0, pixels = 0;
   for (size_t begin = 0; begin < pixels_; begin += kRun) {
-    const size_t end = std::min(begin + kRun, pixels_);
-    int32_t seen = 0;
-    for (size_t i = begin; i < end; ++i) seen -= mask[0][i] | mask[1][i];
-    pixels += static_cast<uint64_t>(seen);
+    const size_t count = std::min(kRun, pixels_ - begin);
+    const int16_t *mask_a = &foreground_[a * pixels_ + begin], *mask_b = &foreground_[b * pixels_ + begin];
+    pixels += count_union(mask_a, mask_b, count);
     for (size_t c = 0; c < 3; ++c) {
-      const int16_t *x = &values_[(3 * a + c) * pixels_], *y = &values_[(3 * b + c) * pixels_];
-      int32_t squares = 0;
-      for (size_t i = begin; i < end; ++i) {
-        const auto difference = static_cast<int16_t>((x[i] - y[i]) & (mask[0][i] | mask[1][i]));
-        squares += int32_t(difference) * difference;
-      }
-      sum += static_cast<uint64_t>(squares);
+      sum += masked_squares(&values_[(3 * a + c) * pixels_ + begin], &values_[(3 * b + c) * pixels_ + begin], mask_a, mask_b, count);
     }
   }
   return {static_cast<double>(sum) / kHalfLevels2, 3 * pixels};

@@ -1,5 +1,7 @@
 #include "toolchain/evaluate/people_distances.h"
 
+#include <torch/torch.h>
+
 #include <algorithm>
 
 #include "figurine/check.h"
@@ -27,31 +29,46 @@ PictureRows embed_shot(const PerceptualNetwork& network, const People& people, s
   return rows;
 }
 
-// Squared distances of rows [first, first + count) of a to those of b.
-RowMatrix distances_of_rows(const PictureRows& a, Eigen::Index first, Eigen::Index count, const PictureRows& b) {
-  return pooled_mse(a.middleRows(first, count), b) * static_cast<double>(a.cols());
+// What is left of |a|^2 + |b|^2 - 2 a b by rounding where a and b are equal.
+constexpr double kRounding = 1e-12;
+constexpr Eigen::Index kValuesAtOnce = 4096;  // of an embedding: what is held in double
+
+torch::Tensor doubles_of(const PictureRows& rows, Eigen::Index first, Eigen::Index count) {
+  const torch::Tensor out = torch::empty({rows.rows(), count}, torch::kFloat64);
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    std::copy_n(&rows(i, first), count, out.data_ptr<double>() + i * count);
+  }
+  return out;
 }
 
-void add_shot(const PictureRows& people, const PictureRows& references, const Crew& crew, PeopleDistances& sums) {
-  const auto pieces = static_cast<size_t>((people.rows() + kRows - 1) / kRows);
-  crew.run("comparing through a network", pieces, [&](size_t piece) {
-    const Eigen::Index first = static_cast<Eigen::Index>(piece) * kRows, count = std::min(kRows, people.rows() - first),
-                       left = people.rows() - first;
-    if (references.rows() > 0) sums.to_references.middleRows(first, count) += distances_of_rows(people, first, count, references);
-    sums.within.block(first, first, count, left) += distances_of_rows(people, first, count, people.bottomRows(left));
-  });
+// Squared distances of all rows of a to all of b, in double: a matrix product, since there are many more pairs than pictures. [A,B]
+RowMatrix squared_distances(const PictureRows& a, const PictureRows& b) {
+  const torch::NoGradGuard no_gradient;
+  torch::Tensor products = torch::zeros({a.rows(), b.rows()}, torch::kFloat64);
+  torch::Tensor of_a = torch::zeros({a.rows(), 1}, torch::kFloat64), of_b = torch::zeros({1, b.rows()}, torch::kFloat64);
+  for (Eigen::Index first = 0; first < a.cols(); first += kValuesAtOnce) {
+    const Eigen::Index count = std::min(kValuesAtOnce, a.cols() - first);
+    const torch::Tensor x = doubles_of(a, first, count), y = &a == &b ? x : doubles_of(b, first, count);
+    products.addmm_(x, y.t());
+    of_a += x.square().sum(1, true), of_b += y.square().sum(1).unsqueeze(0);
+  }
+  const torch::Tensor sizes = of_a + of_b;
+  torch::Tensor squared = sizes - 2 * products;
+  squared = torch::where(squared < kRounding * sizes, torch::zeros_like(squared), squared).contiguous();
+  return Eigen::Map<const RowMatrix>(squared.data_ptr<double>(), a.rows(), b.rows());
 }
 
 }  // namespace
 
-PeopleDistances measure_distances(const PerceptualNetwork& network, const People& people, const People& references, const Crew& crew,
-                                  uint32_t threads) {
+PeopleDistances measure_distances(const PerceptualNetwork& network, const People& people, const People& references, uint32_t threads) {
   FIG_CHECK(!people.empty() && !people[0].empty(), "somebody to be compared");
   const size_t shots = people[0].size();
   const auto count = static_cast<Eigen::Index>(people.size());
   PeopleDistances sums{RowMatrix::Zero(count, static_cast<Eigen::Index>(references.size())), RowMatrix::Zero(count, count)};
   for (size_t shot = 0; shot < shots; ++shot) {
-    add_shot(embed_shot(network, people, shot, threads), embed_shot(network, references, shot, threads), crew, sums);
+    const PictureRows own = embed_shot(network, people, shot, threads);
+    sums.within += squared_distances(own, own);
+    if (!references.empty()) sums.to_references += squared_distances(own, embed_shot(network, references, shot, threads));
   }
   for (Eigen::Index i = 0; i < count; ++i) {
     for (Eigen::Index j = 0; j < i; ++j) sums.within(i, j) = sums.within(j, i);

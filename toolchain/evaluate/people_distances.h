@@ -18,15 +18,15 @@ namespace figurine::evaluate {
 
 using People = std::vector<std::vector<Picture>>;  // of V pictures each
 
-// Means over the V pairs of pictures of the same pose and side. Equal people are 0 apart, and either order is the same, to the bit.
+// Means over the V pairs of pictures of the same pose and side. Equal people are 0 apart; what is nearer than rounding
+// counts as equal.
 struct PeopleDistances {
   RowMatrix to_references;  // [A,R]
   RowMatrix within;         // [A,A]
 };
-// references: may be empty. threads: of the network; crew: of the comparisons. Throws InputError if the network cannot take the pictures,
+// references: may be empty. threads: of the network. Throws InputError if the network cannot take the pictures,
 // or Interrupted.
-PeopleDistances measure_distances(const PerceptualNetwork& network, const People& people, const People& references, const Crew& crew,
-                                  uint32_t threads);
+PeopleDistances measure_distances(const PerceptualNetwork& network, const People& people, const People& references, uint32_t threads);
 
 // [A V, F], person by person.
 RowMatrix measure_features(const FeatureNetwork& network, const People& people, uint32_t threads);

@@ -85,17 +85,12 @@ std::shared_ptr<const Pixels> pixels() { return std::make_shared<const Pixels>()
 
 ComparingNetworks both(size_t dimension = 3) { return {{std::make_shared<const Colours>(dimension)}, {pixels()}}; }
 
-const Crew& crew() {
-  static const Crew crew(2, true);
-  return crew;
-}
-
 double value(const nlohmann::json& of) { return of.at("value").get<double>(); }
 
 TEST(PeopleDistances, AreMeansOverPicturesOfTheSameShot) {
   const People people = random_people(19, 1), references = random_people(5, 2);  // more than a tile's
   const auto network = pixels();
-  const PeopleDistances found = measure_distances(*network, people, references, crew(), 2);
+  const PeopleDistances found = measure_distances(*network, people, references, 2);
   EXPECT_EQ(network->seen(), (19 + 5) * kPictures) << "a picture is looked at once";
   double worst = 0;
   for (size_t i = 0; i < people.size(); ++i) {
@@ -115,7 +110,7 @@ TEST(PeopleDistances, AreMeansOverPicturesOfTheSameShot) {
   }
   std::printf("  largest relative error %.1e\n", worst);
   EXPECT_LT(worst, 1e-12);
-  const PeopleDistances alone = measure_distances(*network, people, {}, crew(), 1);
+  const PeopleDistances alone = measure_distances(*network, people, {}, 1);
   EXPECT_EQ(alone.within, found.within) << "in any company, on any number of threads";
   EXPECT_EQ(alone.to_references.cols(), 0);
 }
@@ -133,7 +128,7 @@ TEST(PeopleFeatures, StandPersonByPerson) {
 TEST(GenerationNetworks, CopiesAreFoundOut) {
   const People training = random_people(8, 4), held_out = random_people(5, 5);
   const ComparingNetworks networks = both();
-  const GenerationNetworks judge(networks, training, held_out, crew(), 2, kBootstrap);
+  const GenerationNetworks judge(networks, training, held_out, 2, kBootstrap);
   nlohmann::json row;
   judge.add_samples(training, Eigen::Index(training.size()), row);
   const nlohmann::json& near = row.at("train").at("perceptual").at("pixels");
@@ -165,13 +160,14 @@ TEST(GenerationNetworks, CopiesAreFoundOut) {
 TEST(GenerationNetworks, TheAuditLooksForWhomASamplerLearntFrom) {
   const People training = random_people(8, 4), held_out = random_people(5, 5);
   const ComparingNetworks networks = both();
-  const GenerationNetworks judge(networks, training, held_out, crew(), 2, kBootstrap);
+  const GenerationNetworks judge(networks, training, held_out, 2, kBootstrap);
   nlohmann::json all, half;
   judge.add_samples(training, 8, all), judge.add_samples(training, 4, half);
   const auto audit = [](const nlohmann::json& row) { return row.at("novelty").at("perceptual").at("pixels"); };
   EXPECT_EQ(audit(all).at("copy_share"), 1);
   EXPECT_EQ(audit(all).at("members_met"), 8);
-  EXPECT_EQ(audit(half).at("copy_share"), 0.5);
+  EXPECT_GE(audit(half).at("copy_share"), 0.5);
+  EXPECT_LT(audit(half).at("copy_share"), 1) << "the four others are people of their own";
   EXPECT_EQ(audit(half).at("members_met"), 4);
   EXPECT_EQ(half.at("train"), all.at("train"));
 }
@@ -179,7 +175,7 @@ TEST(GenerationNetworks, TheAuditLooksForWhomASamplerLearntFrom) {
 TEST(GenerationNetworks, TheOrderOfSamplesDoesNotMatter) {
   const People training = random_people(6, 6), held_out = random_people(6, 7), samples = random_people(6, 8);
   const ComparingNetworks networks = both();
-  const GenerationNetworks judge(networks, training, held_out, crew(), 2, kBootstrap);
+  const GenerationNetworks judge(networks, training, held_out, 2, kBootstrap);
   nlohmann::json row, other_row;
   judge.add_samples(samples, Eigen::Index(training.size()), row);
   judge.add_samples({samples[4], samples[0], samples[5], samples[2], samples[1], samples[3]}, Eigen::Index(training.size()), other_row);
@@ -207,7 +203,7 @@ TEST(GenerationNetworks, LeaveTheFrechetDistanceOutWherePicturesAreFew) {
   const People training = random_people(8, 9), held_out = random_people(4, 10);
   // 24 training pictures are enough for 6 features, 12 held-out ones are not.
   const ComparingNetworks networks = both(6);
-  const GenerationNetworks judge(networks, training, held_out, crew(), 2, kBootstrap);
+  const GenerationNetworks judge(networks, training, held_out, 2, kBootstrap);
   nlohmann::json row;
   judge.add_samples(training, Eigen::Index(training.size()), row);
   EXPECT_TRUE(row.at("train").at("frechet").at("colours").contains("value"));
@@ -218,7 +214,7 @@ TEST(GenerationNetworks, LeaveTheFrechetDistanceOutWherePicturesAreFew) {
 TEST(GenerationNetworks, SayNothingWhereThereAreNone) {
   const People people = random_people(4, 11);
   const ComparingNetworks none;
-  const GenerationNetworks judge(none, people, people, crew(), 1, kBootstrap);
+  const GenerationNetworks judge(none, people, people, 1, kBootstrap);
   nlohmann::json row = nlohmann::json::object();
   judge.add_samples(people, Eigen::Index(people.size()), row), judge.add_training_as_samples(row), judge.add_held_out_novelty(row);
   EXPECT_TRUE(row.empty()) << row;
