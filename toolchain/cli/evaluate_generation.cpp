@@ -37,7 +37,7 @@ struct GenerationArguments {
   evaluate::NetworkFiles networks;
   size_t rank = 64;
   uint32_t threads = 1;
-  bool quiet = false;
+  bool quiet = false, baselines = true;
 };
 
 nlohmann::json head() {
@@ -137,19 +137,23 @@ void run_generation(const GenerationArguments& arguments) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const nlohmann::json description = train::read_json(train::RunDirectory{path}.run_json());
     nlohmann::json run{{"name", name}, {"seconds_per_sample", seconds / static_cast<double>(draw.count)}};
-    for (const char* key : {"settings", "parameters", "macs_per_evaluation", "iterations", "train_seconds", "loss", "validation_loss"}) {
+    for (const char* key : {"settings", "parameters", "macs_per_evaluation", "seconds_per_evaluation", "iterations", "train_seconds",
+                            "loss", "validation_loss"}) {
       if (description.contains(key)) run[key] = description.at(key);
     }
     run["posterior_entropy"] = describe_entropy(sampler);
     runs.push_back(std::move(run));
   }
-  const double noised_db = generated.empty() ? 20 : evaluate::nearest_member_db(set, generated.front());
-  for (evaluate::Generated& baseline : evaluate::make_baselines(set, arguments.rank, noised_db, arguments.options.seed)) {
-    generated.push_back(std::move(baseline));
+  double noised_db = NAN;
+  if (arguments.baselines) {
+    noised_db = generated.empty() ? 20 : evaluate::nearest_member_db(set, generated.front());
+    for (evaluate::Generated& baseline : evaluate::make_baselines(set, arguments.rank, noised_db, arguments.options.seed)) {
+      generated.push_back(std::move(baseline));
+    }
   }
   nlohmann::json report = head();
   report["evaluations"] = arguments.draw.steps;
-  report["noised_members_db"] = noised_db;
+  if (arguments.baselines) report["noised_members_db"] = noised_db;
   report["runs"] = runs;
   report["networks"] = networks;
   report.update(evaluate::evaluate_generation(set, generated, options));
@@ -213,6 +217,7 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
   command->add_option("--replicates", arguments->options.replicates, "Of the bootstrap (default 1000)")->check(CLI::Range(10, 100000));
   command->add_option("--seed", arguments->options.seed, "Of baselines and bootstrap (default 0)");
   command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->add_flag("--baselines,!--no-baselines", arguments->baselines, "The rows that need no training (default: yes)");
   command->add_flag("--quiet", arguments->quiet, "No progress, no table");
   command->add_option("--sheet", arguments->sheet, "Picture to write, JPEG: the first 16 people of every row, in the table's order");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");

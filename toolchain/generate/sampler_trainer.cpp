@@ -1,5 +1,7 @@
 #include "toolchain/generate/sampler_trainer.h"
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -249,6 +251,23 @@ nlohmann::json to_json(const FlatProgress& progress, const char* status) {
           {"log", log_to_json(progress.log)}};
 }
 
+// Seconds of one evaluation of one vector: the median of a few.
+double time_evaluation(const Transformer& transformer, const SamplerSettings& settings) {
+  constexpr int kTimes = 5;
+  const torch::NoGradGuard no_gradient;
+  const torch::Tensor z =
+      torch::zeros({1, std::accumulate(settings.shape.token_sizes.begin(), settings.shape.token_sizes.end(), int64_t{0})});
+  const torch::Tensor lambda = torch::zeros({1}, torch::kFloat64);
+  std::vector<double> seconds;
+  for (int i = 0; i <= kTimes; ++i) {  // the first one does not count
+    const auto start = std::chrono::steady_clock::now();
+    transformer.forward(z, lambda, settings.bf16);
+    if (i > 0) seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  std::nth_element(seconds.begin(), seconds.begin() + kTimes / 2, seconds.end());
+  return seconds[kTimes / 2];
+}
+
 // The run's files besides the checkpoint, after one was written.
 void save_run(const train::RunDirectory& run, nlohmann::json& description, const Transformer& transformer, const torch::Tensor& average,
               const char* status, const FlatProgress& progress) {
@@ -354,6 +373,7 @@ SamplerResult train_sampler(const SamplerRequest& request) {
 
   Denoising denoising(settings, dimension, space->encode(members.training), space->encode(members.validation));
   FlatTrainer trainer(denoising, group, training_of(request, settings), [&](const char* status, const FlatProgress& progress) {
+    if (status == std::string("finished")) plan.description["seconds_per_evaluation"] = time_evaluation(denoising.transformer(), settings);
     save_run(run, plan.description, denoising.transformer(), trainer.average(), status, progress);
   });
   if (group.leads() && request.resume) trainer.resume(plan.description.value("log", nlohmann::json::array()));

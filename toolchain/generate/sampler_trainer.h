@@ -5,7 +5,8 @@
 // weights). The moving average of the weights is what is kept. Everything that is drawn is a function of (seed, iteration, place in the
 // batch), so a resumed run draws what an uninterrupted one draws, and ranks of a cluster share a batch without a word (flat_trainer.h).
 //
-//   RUN/run.json                 command, settings, population (its content hash), machine; when done also iterations and seconds
+//   RUN/run.json                 command, settings, population (its content hash), machine; when done also iterations, seconds, and
+//                                seconds_per_evaluation of one vector
 //   RUN/log.csv                  iteration, seconds, learning rate, loss, loss of the validation members (empty if there are none)
 //   RUN/weights.safetensors      the denoiser, moving average: one tensor a parameter
 //   RUN/checkpoint.safetensors   what --resume needs
