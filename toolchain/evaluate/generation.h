@@ -1,7 +1,7 @@
 // How a generator's people compare with people that it has seen and with people that it has not (docs/numerics.md, "Generation"): MMD, COV
 // and 1-NNA of pictures, the novelty audit in weights and in pictures, and sharpness, for trained samplers and for the rows that they have
 // to beat; the same in the distance and the features of networks where there are any. Pictures are the device renderer's in a population's
-// common poses and views; references are renders of trained avatars.
+// common poses and views; references are renders of trained avatars and, on request, captures of the held-out people themselves.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,7 @@
 
 #include "toolchain/evaluate/feature_network.h"
 #include "toolchain/evaluate/member_set.h"
+#include "toolchain/evaluate/people_distances.h"
 
 namespace figurine::evaluate {
 
@@ -30,6 +31,7 @@ struct GenerationOptions {
   uint64_t seed = 0;
   ComparingNetworks networks;  // by which pictures are compared besides PSNR
   uint32_t threads = 1;        // of the networks
+  People captures;             // of the held-out members (captured_people.h), in the set's order, as further references; or empty
 };
 
 // "references": what the sets are; "rows": one for each of the generated, and one of the held-out members themselves for the audit and

@@ -53,6 +53,8 @@ class Studio {
   Studio(const Package& body, std::vector<train::OwnedPose> poses, std::vector<Shot> shots);
 
   const std::vector<Shot>& shots() const { return shots_; }
+  PoseView pose(size_t shot) const { return poses_[shots_[shot].pose].view(); }
+  const Camera& camera(size_t shot) const { return cameras_[shot]; }  // of no size before it is framed
   // Where the avatar appears in every shot but for the 0.2 % of its Gaussians that lie farthest out on each side.
   std::vector<Extent> look(const Avatar& avatar) const;
   // The shot's camera: the largest scale at which the extent fits into the picture but for a margin of its sides.

@@ -7,6 +7,7 @@
 #include "gtest/gtest.h"
 #include "samples/program.h"
 #include "toolchain/evaluate/people.h"
+#include "toolchain/population/small_recipe.h"
 
 namespace figurine::cli {
 namespace {
@@ -91,6 +92,9 @@ TEST(EvaluateGeneration, BadInputGivesOneLineAndNoReport) {
   refused("--population three.fgn --lpips text.pt", "text.pt: not a TorchScript file");
   refused("--population three.fgn --inception text.pt", "text.pt: not a TorchScript file");
   refused("--population three.fgn", "has more held-out members than training ones");
+  folder.write("other.json", testing_tools::small_recipe().dump());
+  refused("--population three.fgn --recipe none.json", "none.json");
+  refused("--population three.fgn --recipe other.json", "other.json: name: 'small' is not the recipe of population 'people'");
 }
 
 }  // namespace

@@ -13,7 +13,6 @@
 
 #include "tests/toolchain/population/small_recipe.h"
 #include "tests/toolchain/train/small_capture.h"
-#include "toolchain/body/motion_clip.h"
 #include "toolchain/error.h"
 #include "toolchain/population/build.h"
 #include "toolchain/population/state.h"
@@ -28,24 +27,10 @@ using testing_tools::TemporaryFolder;
 
 constexpr const char* kPeople[] = {"000000", "000001", "000002", "000010"};
 
-void write_motion(const std::string& path) {
-  body::MotionClip clip;
-  clip.name = "swinging";
-  clip.frame_count = 40;
-  for (uint32_t f = 0; f < clip.frame_count; ++f) {
-    clip.root_translation_m.insert(clip.root_translation_m.end(), {0, 0, 0});
-    for (uint32_t j = 0; j < body::kJointCount; ++j) {
-      const double angle = 0.25 * std::sin(0.2 * f + 1.7 * j);
-      clip.rotations.insert(clip.rotations.end(), {static_cast<float>(std::cos(angle / 2)), static_cast<float>(std::sin(angle / 2)), 0, 0});
-    }
-  }
-  throw_if_error(ports::write_file_atomically(path, value_or_throw(write_package(clip.view(), {.tool = "test"}), path)), path);
-}
-
 struct Workplace {
   TemporaryFolder folder;
   Workplace() {
-    write_motion(folder.path("swinging.fgn"));
+    testing_tools::write_swinging_motion(folder.path("swinging.fgn"));
     train::write_json(folder.path("recipe.json"), testing_tools::small_recipe());
   }
   BuildOptions options(const std::string& state) const {

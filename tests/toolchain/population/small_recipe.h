@@ -1,8 +1,15 @@
 // A recipe that takes seconds: four mannequins at `nano`, swinging. Needs no data.
 #pragma once
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "formats/writer/package_writer.h"
+#include "ports/linux/files.h"
+#include "toolchain/body/motion_clip.h"
+#include "toolchain/body/skeleton.h"
+#include "toolchain/error.h"
 
 namespace figurine::testing_tools {
 
@@ -16,6 +23,21 @@ inline nlohmann::json small_recipe() {
     "training": {"iterations": 40},
     "evaluation": {"frozen": [10], "scratch": [10], "rounded": [10]}
   })");
+}
+
+// Its motion, which lies beside it.
+inline void write_swinging_motion(const std::string& path) {
+  body::MotionClip clip;
+  clip.name = "swinging";
+  clip.frame_count = 40;
+  for (uint32_t f = 0; f < clip.frame_count; ++f) {
+    clip.root_translation_m.insert(clip.root_translation_m.end(), {0, 0, 0});
+    for (uint32_t j = 0; j < body::kJointCount; ++j) {
+      const double angle = 0.25 * std::sin(0.2 * f + 1.7 * j);
+      clip.rotations.insert(clip.rotations.end(), {static_cast<float>(std::cos(angle / 2)), static_cast<float>(std::sin(angle / 2)), 0, 0});
+    }
+  }
+  throw_if_error(ports::write_file_atomically(path, value_or_throw(write_package(clip.view(), {.tool = "test"}), path)), path);
 }
 
 }  // namespace figurine::testing_tools
