@@ -1,4 +1,5 @@
-"""Puts a sampler's figures together: FOLDER/{generation,sampling,timed}.json -> docs/results/generation.json and sampling.json.
+"""Puts a sampler's figures together: FOLDER/{generation,sampling,timed}.json and the runs' losses -> docs/results/generation.json,
+sampling.json and sampler_loss_NAME.csv.
 
     sampler_report.py FOLDER NAME OUTPUT COMMAND
 
@@ -10,6 +11,8 @@ import json
 import os
 import pathlib
 import sys
+
+from variants_report import losses
 
 
 def read(path):
@@ -37,6 +40,7 @@ def main():
     generation = read(output / "generation.json") or {}
     generation[name] = head | without_paths(read(folder / "generation.json"))
     write(output / "generation.json", generation)
+    (output / f"sampler_loss_{name}.csv").write_text(losses(folder, ["basis", "layer"]))
 
     sampling, timed = read(folder / "sampling.json"), read(folder / "timed.json")
     orders = sampling["order"]

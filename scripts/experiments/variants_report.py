@@ -12,13 +12,24 @@ import os
 import pathlib
 import sys
 
-STEP = 500  # iterations between rows of the losses
+STEP = 100  # iterations between rows of the losses
 
 
 def write(path, text):
     fresh = path.with_suffix(path.suffix + ".tmp")
     fresh.write_text(text)
     os.replace(fresh, path)
+
+
+def losses(folder, runs):
+    """Every STEP-th row of the runs' logs, as CSV."""
+    lines = ["run,iteration,seconds,loss,validation_loss"]
+    for run in runs:
+        with open(folder / run / "log.csv", encoding="utf-8") as log:
+            for row in csv.DictReader(log):
+                if int(row["iteration"]) % STEP == 0:
+                    lines.append(f"{run},{row['iteration']},{float(row['seconds']):.0f},{row['loss']},{row['validation_loss']}")
+    return "\n".join(lines) + "\n"
 
 
 def main():
@@ -34,13 +45,7 @@ def main():
     } | report
     write(path, json.dumps(generation, indent=2, sort_keys=True) + "\n")
 
-    lines = ["run,iteration,seconds,loss,validation_loss"]
-    for run in runs:
-        with open(folder / run / "log.csv", encoding="utf-8") as log:
-            for row in csv.DictReader(log):
-                if int(row["iteration"]) % STEP == 0:
-                    lines.append(f"{run},{row['iteration']},{float(row['seconds']):.0f},{row['loss']},{row['validation_loss']}")
-    write(output / f"sampler_loss_{name}.csv", "\n".join(lines) + "\n")
+    write(output / f"sampler_loss_{name}.csv", losses(folder, runs))
 
 
 if __name__ == "__main__":
