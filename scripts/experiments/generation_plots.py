@@ -53,7 +53,8 @@ def draw_people(axes, report):
     axes.set(xlabel="people to learn from", title="Copies and newness of samples, nano")
     axes.set_xticks([50, 100, 250, 500], ["50", "100", "250", "500"])
     axes.minorticks_off()
-    axes.legend(fontsize=7)
+    axes.set_ylim(top=210)  # room for the legend
+    axes.legend(fontsize=7, loc="upper right")
 
 
 def draw_losses(axes, path):

@@ -1,10 +1,8 @@
 #include "toolchain/evaluate/feature_trainer.h"
 
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -18,6 +16,7 @@
 #include "toolchain/evaluate/posed_studio.h"
 #include "toolchain/evaluate/solo_threads.h"
 #include "toolchain/model/optimiser.h"
+#include "toolchain/train/flat_tensor.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/progress.h"
@@ -42,12 +41,6 @@ constexpr uint32_t kViews = 6, kFewestViews = 2;
 enum Stream : uint64_t { kZoom = 2, kShiftX = 3, kShiftY = 4, kPairs = 5, kClasses = 6 };
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
-std::string exact(double value) {
-  char text[40];
-  const auto end = std::to_chars(text, text + sizeof(text), value);
-  return {text, end.ptr};
-}
 
 nlohmann::json to_json(const FeatureSettings& settings) {
   return {{"poses", settings.poses},
@@ -96,32 +89,10 @@ PictureBank draw_bank(const PosedStudio& studio, const std::vector<size_t>& memb
   return bank;
 }
 
-double number_of(const train::TensorFile& file, const std::string& path, const std::string& key) {
-  const auto found = file.metadata.find(key);
-  double value = 0;
-  if (found == file.metadata.end() ||
-      std::from_chars(found->second.data(), found->second.data() + found->second.size(), value).ec != std::errc{} || !(value >= 0)) {
-    throw InputError(path + ": " + key + ": missing or no number");
-  }
-  return value;
-}
-
 std::string text_of(const train::TensorFile& file, const std::string& path, const std::string& key) {
   const auto found = file.metadata.find(key);
   if (found == file.metadata.end()) throw InputError(path + ": " + key + ": missing");
   return found->second;
-}
-
-train::NamedTensor flat(const torch::Tensor& tensor) {
-  const float* data = tensor.data_ptr<float>();
-  return {{tensor.numel()}, {data, data + tensor.numel()}};
-}
-
-void take_flat(const train::TensorFile& file, const std::string& path, const std::string& name, torch::Tensor& tensor) {
-  const auto found = file.tensors.find(name);
-  if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
-  if (found->second.values.size() != static_cast<size_t>(tensor.numel())) throw InputError(path + ": " + name + ": is of another size");
-  std::memcpy(tensor.data_ptr<float>(), found->second.values.data(), found->second.values.size() * sizeof(float));
 }
 
 // The network's weights, then a class vector for every member: [P + N F].
@@ -144,12 +115,12 @@ class FeatureTrainer {
         threads_(request.threads) {}
 
   void take_checkpoint(const train::TensorFile& file, const std::string& path) {
-    take_flat(file, path, "weights", weights_);
-    take_flat(file, path, "first_moment", optimiser_.first_moment);
-    take_flat(file, path, "second_moment", optimiser_.second_moment);
-    iteration_ = static_cast<uint64_t>(number_of(file, path, "iteration")), seconds_ = number_of(file, path, "seconds");
-    optimiser_.steps = static_cast<int64_t>(number_of(file, path, "optimiser_steps"));
-    loss_ = number_of(file, path, "loss"), accuracy_ = number_of(file, path, "accuracy");
+    train::take_flat_tensor(file, path, "weights", weights_);
+    train::take_flat_tensor(file, path, "first_moment", optimiser_.first_moment);
+    train::take_flat_tensor(file, path, "second_moment", optimiser_.second_moment);
+    iteration_ = static_cast<uint64_t>(train::take_number(file, path, "iteration")), seconds_ = train::take_number(file, path, "seconds");
+    optimiser_.steps = static_cast<int64_t>(train::take_number(file, path, "optimiser_steps"));
+    loss_ = train::take_number(file, path, "loss"), accuracy_ = train::take_number(file, path, "accuracy");
     shown_ = iteration_;
   }
 
@@ -265,10 +236,11 @@ class FeatureTrainer {
     file.metadata["format"] = kCheckpointFormat;
     file.metadata["iteration"] = std::to_string(iteration_);
     file.metadata["optimiser_steps"] = std::to_string(optimiser_.steps);
-    file.metadata["seconds"] = exact(seconds_), file.metadata["loss"] = exact(loss_), file.metadata["accuracy"] = exact(accuracy_);
-    file.tensors["weights"] = flat(weights_);
-    file.tensors["first_moment"] = flat(optimiser_.first_moment);
-    file.tensors["second_moment"] = flat(optimiser_.second_moment);
+    file.metadata["seconds"] = train::exact_number(seconds_), file.metadata["loss"] = train::exact_number(loss_),
+    file.metadata["accuracy"] = train::exact_number(accuracy_);
+    file.tensors["weights"] = train::flat_tensor(weights_);
+    file.tensors["first_moment"] = train::flat_tensor(optimiser_.first_moment);
+    file.tensors["second_moment"] = train::flat_tensor(optimiser_.second_moment);
     train::write_tensor_file(checkpoint(), file);
   }
 
@@ -321,7 +293,8 @@ class FeatureTrainer {
   void finish() {
     const torch::Tensor network = weights_.narrow(0, 0, feature_parameter_count()).clone();
     std::vector<LayerWeights> distance = weigh_layers(network);
-    provenance_["train_seconds"] = exact(seconds_), provenance_["loss"] = exact(loss_), provenance_["accuracy"] = exact(accuracy_);
+    provenance_["train_seconds"] = train::exact_number(seconds_), provenance_["loss"] = train::exact_number(loss_),
+    provenance_["accuracy"] = train::exact_number(accuracy_);
     provenance_["created"] = train::utc_now();
     FigurineFeatures(network, std::move(distance), provenance_).save(request_.output);
     std::error_code ignored;
@@ -370,9 +343,9 @@ FeatureResult finished(const std::string& path) {
   const train::TensorFile file = train::read_tensor_file(path);
   const FeatureSettings settings = settings_from_json(text_of(file, path, "settings"), path);
   return {.iteration = settings.schedule.budget.iterations,
-          .seconds = number_of(file, path, "train_seconds"),
-          .loss = number_of(file, path, "loss"),
-          .accuracy = number_of(file, path, "accuracy"),
+          .seconds = train::take_number(file, path, "train_seconds"),
+          .loss = train::take_number(file, path, "loss"),
+          .accuracy = train::take_number(file, path, "accuracy"),
           .was_finished = true};
 }
 

@@ -1,16 +1,14 @@
 #include "toolchain/generate/flat_trainer.h"
 
-#include <charconv>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "ports/linux/files.h"
+#include "toolchain/train/flat_tensor.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
-#include "toolchain/train/tensor_file.h"
 
 namespace figurine::generate {
 
@@ -21,34 +19,6 @@ constexpr uint64_t kValidationPeriod = 500;  // iterations; a multiple of the lo
 constexpr double kRunningMean = 0.02;
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
-std::string exact(double value) {
-  char text[40];
-  const auto end = std::to_chars(text, text + sizeof(text), value);
-  return {text, end.ptr};
-}
-
-train::NamedTensor flat(const torch::Tensor& tensor) {
-  const float* data = tensor.data_ptr<float>();
-  return {{tensor.numel()}, {data, data + tensor.numel()}};
-}
-
-void take_flat(const std::string& path, const train::TensorFile& file, const std::string& name, torch::Tensor& tensor) {
-  const auto found = file.tensors.find(name);
-  if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
-  if (found->second.values.size() != static_cast<size_t>(tensor.numel())) throw InputError(path + ": " + name + ": is of another size");
-  std::memcpy(tensor.data_ptr<float>(), found->second.values.data(), found->second.values.size() * sizeof(float));
-}
-
-double take_number(const std::string& path, const train::TensorFile& file, const char* key) {
-  const auto found = file.metadata.find(key);
-  double value = 0;
-  if (found == file.metadata.end() ||
-      std::from_chars(found->second.data(), found->second.data() + found->second.size(), value).ec != std::errc{} || !(value >= 0)) {
-    throw InputError(path + ": " + key + ": missing or no number");
-  }
-  return value;
-}
 
 }  // namespace
 
@@ -110,13 +80,13 @@ void FlatTrainer::resume(const nlohmann::json& log) {
   const std::string& path = options_.checkpoint;
   if (!group_.leads() || !std::filesystem::exists(path)) return;
   const train::TensorFile file = train::read_tensor_file(path);
-  take_flat(path, file, "weights", model_.weights());
-  take_flat(path, file, "average", average_);
-  take_flat(path, file, "first_moment", optimiser_.first_moment);
-  take_flat(path, file, "second_moment", optimiser_.second_moment);
-  progress_.iteration = static_cast<uint64_t>(take_number(path, file, "iteration"));
-  progress_.seconds = take_number(path, file, "seconds");
-  optimiser_.steps = static_cast<int64_t>(take_number(path, file, "optimiser_steps"));
+  train::take_flat_tensor(file, path, "weights", model_.weights());
+  train::take_flat_tensor(file, path, "average", average_);
+  train::take_flat_tensor(file, path, "first_moment", optimiser_.first_moment);
+  train::take_flat_tensor(file, path, "second_moment", optimiser_.second_moment);
+  progress_.iteration = static_cast<uint64_t>(train::take_number(file, path, "iteration"));
+  progress_.seconds = train::take_number(file, path, "seconds");
+  optimiser_.steps = static_cast<int64_t>(train::take_number(file, path, "optimiser_steps"));
   progress_.log = log_from_json(log, progress_.iteration);
 }
 
@@ -238,13 +208,13 @@ void FlatTrainer::record(double loss, double rate) {
 void FlatTrainer::save(const char* status) {
   if (!group_.leads()) return;
   train::TensorFile file;
-  file.tensors["weights"] = flat(model_.weights());
-  file.tensors["average"] = flat(average_);
-  file.tensors["first_moment"] = flat(optimiser_.first_moment);
-  file.tensors["second_moment"] = flat(optimiser_.second_moment);
-  file.metadata["iteration"] = exact(static_cast<double>(progress_.iteration));
-  file.metadata["seconds"] = exact(progress_.seconds);
-  file.metadata["optimiser_steps"] = exact(static_cast<double>(optimiser_.steps));
+  file.tensors["weights"] = train::flat_tensor(model_.weights());
+  file.tensors["average"] = train::flat_tensor(average_);
+  file.tensors["first_moment"] = train::flat_tensor(optimiser_.first_moment);
+  file.tensors["second_moment"] = train::flat_tensor(optimiser_.second_moment);
+  file.metadata["iteration"] = train::exact_number(static_cast<double>(progress_.iteration));
+  file.metadata["seconds"] = train::exact_number(progress_.seconds);
+  file.metadata["optimiser_steps"] = train::exact_number(static_cast<double>(optimiser_.steps));
   train::write_tensor_file(options_.checkpoint, file);
   saved_(status, progress_);
 }
