@@ -26,7 +26,7 @@ class TrainSampler(unittest.TestCase):
     def setUpClass(cls):
         missing = [name for name in ["slurmctld", "slurmd", "sbatch"] if shutil.which(name) is None]
         if missing:
-            raise AssertionError(f"no {missing[0]} here: scripts/setup toolchain installs it")
+            raise AssertionError(f"no {missing[0]} here: scripts/setup cluster installs it")
         cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         subprocess.run([MAKE_PEOPLE, cls.folder / "people.fgn"], check=True)
         cls.cluster = cls.enterClassContext(LoopbackCluster(cls.enterClassContext(tempfile.TemporaryDirectory()), nodes=2))
