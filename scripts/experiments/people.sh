@@ -1,18 +1,9 @@
-# Sourced by line.sh and quantization.sh, in the checkout and with $folder set: the program, the body, the motions, a person's capture.
+# Sourced by line.sh and quantization.sh, in the checkout and with $folder set: tools.sh, the body, the motions, a person's capture.
 #
 # People walk (four walks and an endless one from CMU 01_03) and jump (01_01), turned through 360 degrees. What is in $folder already stays.
 
-build=build/dev
-started=$SECONDS
-step() { say "$(basename "$0" .sh): $((SECONDS - started)) s: $*"; }
-train() { scripts/run "$build/toolchain/cli/figurine-train" "$@"; }
-export FIGURINE_COMMIT=${FIGURINE_COMMIT:-$(git rev-parse HEAD 2> /dev/null || echo unknown)$(git diff --quiet HEAD -- 2> /dev/null || echo +changes)}
-
-scripts/setup toolchain
-step "building"
-scripts/run cmake --preset dev > /dev/null
-scripts/run cmake --build --preset dev --target figurine-train > /dev/null
-mkdir -p "$folder/runs" docs/results
+. scripts/experiments/tools.sh
+mkdir -p "$folder/runs"
 
 body=$folder/body.fgn
 [ -e "$body" ] || { step "body"; train body --makehuman --uv 128 -o "$body"; }

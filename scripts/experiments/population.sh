@@ -10,12 +10,7 @@ set -euo pipefail
 cd "$figurine_checkout"
 
 name=${1:?edge or nano} folder=${2:-out/population}
-scripts/setup toolchain
-scripts/run cmake --preset dev > /dev/null
-scripts/run cmake --build --preset dev --target figurine-train > /dev/null
-mkdir -p "$folder" docs/results
-export FIGURINE_COMMIT=${FIGURINE_COMMIT:-$(git rev-parse HEAD 2> /dev/null || echo unknown)}
-train() { scripts/run build/dev/toolchain/cli/figurine-train "$@"; }
+. scripts/experiments/tools.sh
 
 state=$folder/$name
 train population "toolchain/population/$name.json" ${MINUTES:+--stop-after "$MINUTES"} -o "$state"

@@ -1,4 +1,4 @@
-"""Puts a sampler's figures together: FOLDER/{generation,sampling,timed}.json and the runs' losses -> docs/results/generation.json,
+"""Puts a sampler's figures together: FOLDER/{generation,sampling,timed}.json, golden.txt and the runs' losses -> docs/results/generation.json,
 sampling.json and sampler_loss_NAME.csv.
 
     sampler_report.py FOLDER NAME OUTPUT COMMAND
@@ -10,6 +10,7 @@ import datetime
 import json
 import os
 import pathlib
+import re
 import sys
 
 from variants_report import losses
@@ -30,6 +31,15 @@ def without_paths(report):
     return {key: value for key, value in report.items() if key not in ("command",)}
 
 
+def same_on_all_cpus(golden, name):
+    """What scripts/check_golden printed of the sampler, one line a CPU."""
+    pattern = rf"^check_golden: (\S+): .*sampler {re.escape(name)}, (\d+) seeds, first (\w+)"
+    found = re.findall(pattern, golden, re.MULTILINE)
+    cpus = [cpu if cpu == "host" else f"{cpu} (QEMU)" for cpu, _, _ in found]
+    hashes = {weights for _, _, weights in found}
+    return {"cpus": cpus, "seeds": int(found[0][1]), "weights_of_seed_0": sorted(hashes), "same": len(hashes) == 1 and len(found) == golden.count("\n")}
+
+
 def main():
     folder, name, output, command = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), sys.argv[4]
     head = {
@@ -40,23 +50,31 @@ def main():
     generation = read(output / "generation.json") or {}
     generation[name] = head | without_paths(read(folder / "generation.json"))
     write(output / "generation.json", generation)
-    (output / f"sampler_loss_{name}.csv").write_text(losses(folder, ["basis", "layer"]))
+    losses_path = output / f"sampler_loss_{name}.csv"
+    runs = [run for run in ("basis", "layer") if (folder / run).exists()]
+    kept = [line for line in losses_path.read_text().splitlines()[1:] if line.split(",")[0] not in runs] if losses_path.exists() else []
+    head_line, *rows = losses(folder, runs).splitlines()
+    losses_path.write_text("\n".join([head_line, *kept, *rows]) + "\n")
 
-    sampling, timed = read(folder / "sampling.json"), read(folder / "timed.json")
-    orders = sampling["order"]
+    same = {"same_on_all_cpus": same_on_all_cpus((folder / "golden.txt").read_text(), name)}
+    measured, timed = read(folder / "sampling.json"), read(folder / "timed.json")
+    if measured is None:  # the package that ships: its figures stay those of when it was made
+        write(output / "sampling.json", read(output / "sampling.json") | same)
+        return
+    orders = measured["order"]
     write(
         output / "sampling.json",
         head
-        | without_paths(sampling)
+        | without_paths(measured)
+        | same
         | {
             "seconds": timed["seconds"]["sample"],
             "peak_mb": timed["peak_memory_bytes"] / 1e6,
             "evaluations": timed["evaluations"],
             "macs_per_evaluation": timed["macs_per_evaluation"],
-            "package_hash": sampling["sampler_hash"],
+            "package_hash": measured["sampler_hash"],
             "order_ddim": orders["network, float32"]["ddim"],
             "order_dpmpp2m": orders["network, float32"]["dpmpp2m"],
-            "same_on_all_cpus": read(folder / "same_on_all_cpus.json"),
         },
     )
 
