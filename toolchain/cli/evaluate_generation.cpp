@@ -1,6 +1,8 @@
 // figurine-train evaluate generation, evaluate sampling: what trained samplers draw, and what the number of evaluations costs and buys.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -21,6 +23,7 @@
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"
+#include "toolchain/verify/device_samples.h"
 #include "toolchain/verify/float_sampler.h"
 #include "toolchain/verify/posterior_entropy.h"
 #include "toolchain/verify/sampling_error.h"
@@ -34,7 +37,7 @@ constexpr size_t kEntropyLevels = 41, kCopiedSteps = 500;
 
 struct GenerationArguments {
   std::string population, body, output, sheet, recipe, makehuman;
-  std::vector<std::string> runs;
+  std::vector<std::string> runs, samplers;
   verify::DrawOptions draw;
   evaluate::GenerationOptions options;
   evaluate::NetworkFiles networks;
@@ -53,13 +56,22 @@ nlohmann::json head() {
 double number(const nlohmann::json& value) { return value.is_number() ? value.get<double>() : NAN; }
 
 void print_rows(const nlohmann::json& rows) {
-  std::printf("%-38s %21s %21s %17s %17s %10s\n", "", "held out: MMD, COV", "1-NNA", "train: MMD, COV", "copies, ratio", "high-pass");
+  std::printf("%-38s %27s %16s %17s %14s %10s\n", "", "held out: MMD, COV, 1-NNA", "of all draws", "train: MMD, COV", "copies, ratio",
+              "high-pass");
   for (const nlohmann::json& row : rows) {
     std::printf("%-38s", row.at("name").get<std::string>().c_str());
     if (row.contains("held_out")) {
       const nlohmann::json& held_out = row.at("held_out");
-      std::printf(" %12.2f dB %5.1f %% %19.1f %%", number(held_out.at("mmd_psnr_db").at("value")),
+      std::printf(" %9.2f dB %5.1f %% %5.1f %%", number(held_out.at("mmd_psnr_db").at("value")),
                   number(held_out.at("coverage_percent").at("value")), number(held_out.at("one_nna_percent").at("value")));
+      const nlohmann::json& draws = held_out.value("draws", nlohmann::json::object());
+      if (!draws.empty()) {
+        std::printf(" %6.1f %% %5.1f %%", number(draws.at("coverage_percent")), number(draws.at("one_nna_percent")));
+      } else {
+        std::printf(" %16s", "");
+      }
+    } else {
+      std::printf(" %27s %16s", "", "");
     }
     if (row.contains("train")) {
       std::printf(" %8.2f dB %5.1f %%", number(row.at("train").at("mmd_psnr_db").at("value")),
@@ -109,11 +121,11 @@ void print_rows_through(const std::string& network, const nlohmann::json& rows) 
   }
 }
 
-// "NAME=RUN", or RUN alone, which is then called as its folder is.
-std::pair<std::string, std::string> named_run(const std::string& text) {
+// "NAME=PATH", or PATH alone, which is then called as its folder or file is.
+std::pair<std::string, std::string> named_path(const std::string& text) {
   const size_t equals = text.find('=');
   if (equals != std::string::npos) return {text.substr(0, equals), text.substr(equals + 1)};
-  return {std::filesystem::path(text).filename().string(), text};
+  return {std::filesystem::path(text).stem().string(), text};
 }
 
 // Over the run's schedule, and where the schedule that the paper's model copies begins.
@@ -133,6 +145,92 @@ nlohmann::json describe_entropy(const generate::TrainedSampler& sampler) {
   return {{"undecided_nats", std::log(static_cast<double>(sampler.training.rows()))}, {"levels", rows}, {"linear_beta_500", last}};
 }
 
+// What is told of a run beside its rows, from its run.json or from a package's report.
+constexpr const char* kRunFields[] = {"settings",      "parameters", "macs_per_evaluation", "seconds_per_evaluation", "iterations",
+                                      "train_seconds", "loss",       "validation_loss"};
+
+// Evaluated samplers: who they draw, and what is told of their training. Packages before runs.
+class Samplers {
+ public:
+  // Throws InputError if a package is none, or learnt from another population.
+  Samplers(const GenerationArguments& arguments, const Package& population) : arguments_(arguments) {
+    for (const std::string& text : arguments.samplers) {
+      const auto [name, path] = named_path(text);
+      packages_.push_back({name, train::open_package(path, PackageKind::kSampler)});
+      const std::array<uint64_t, 2> from = packages_.back().file.package.sampler().population_hash, given = population.content_hash();
+      if (from != given) throw InputError(path + ": population: learnt from " + format_hash(from) + ", this one is " + format_hash(given));
+    }
+  }
+
+  // As many people of each as either part of the set has.
+  void draw(const evaluate::MemberSet& set) {
+    const size_t count = std::max(set.training.size(), set.held_out.size());
+    for (const NamedPackage& package : packages_) draw_package(package, set, count);
+    for (const std::string& text : arguments_.runs) draw_run(text, set, count);
+  }
+
+  std::vector<evaluate::Generated> generated;
+  nlohmann::json about = nlohmann::json::array();
+
+ private:
+  struct NamedPackage {
+    std::string name;
+    train::PackageFile file;
+  };
+
+  // With the device's own integers.
+  void draw_package(const NamedPackage& named, const evaluate::MemberSet& set, size_t count) {
+    const Package& package = named.file.package;
+    const Sampler& sampler = package.sampler();
+    const double start = now_s();
+    const evaluate::RowMatrix weights = verify::sample_weights(
+        sampler, {.first_seed = arguments_.draw.first_seed, .count = count, .steps = arguments_.draw.steps, .quiet = arguments_.quiet});
+    const double seconds = (now_s() - start) / static_cast<double>(count);
+    const nlohmann::json report = nlohmann::json::parse(sampler.report, nullptr, false);
+    nlohmann::json run = nlohmann::json::object();
+    if (report.is_object() && report.contains("runs") && report.at("runs").size() == 1) run = report.at("runs").at(0);
+    tell(named.name, seconds, run);
+    about.back()["package"] = {{"name", sampler.name}, {"hash", format_hash(package.content_hash())}};
+    if (run.contains("posterior_entropy")) about.back()["posterior_entropy"] = run.at("posterior_entropy");
+    generated.push_back({named.name, set.standardisation.standardise(weights), learnt_from(package)});
+  }
+
+  // Of the first so many training members; 0 if the package does not say.
+  static size_t learnt_from(const Package& package) {
+    size_t members = 0;
+    for (const KeyValue& setting : package.provenance().settings) {
+      if (setting.key == "training_members") std::from_chars(setting.value.data(), setting.value.data() + setting.value.size(), members);
+    }
+    return members;
+  }
+
+  void draw_run(const std::string& text, const evaluate::MemberSet& set, size_t count) {
+    const auto [name, path] = named_path(text);
+    const generate::TrainedSampler sampler = generate::TrainedSampler::open(path, arguments_.population);
+    verify::DrawOptions draw = arguments_.draw;
+    draw.count = count;
+    const double start = now_s();
+    const evaluate::RowMatrix weights = verify::draw_weights(sampler, draw);
+    const double seconds = (now_s() - start) / static_cast<double>(count);
+    generated.push_back({name, set.standardisation.standardise(weights), sampler.settings.members});
+    tell(name, seconds, train::read_json(train::RunDirectory{path}.run_json()));
+    about.back()["posterior_entropy"] = describe_entropy(sampler);
+  }
+
+  void tell(const std::string& name, double seconds_per_sample, const nlohmann::json& run) {
+    nlohmann::json told{{"name", name}, {"seconds_per_sample", seconds_per_sample}};
+    for (const char* key : kRunFields) {
+      if (run.contains(key)) told[key] = run.at(key);
+    }
+    about.push_back(std::move(told));
+  }
+
+  static double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+  const GenerationArguments& arguments_;
+  std::vector<NamedPackage> packages_;
+};
+
 void run_generation(const GenerationArguments& arguments) {
   train::use_threads(arguments.threads);
   evaluate::GenerationOptions options = arguments.options;
@@ -142,27 +240,11 @@ void run_generation(const GenerationArguments& arguments) {
   const nlohmann::json networks = evaluate::describe_networks(options.networks, population.package);
   std::optional<evaluate::CapturedPeople> people;
   if (!arguments.recipe.empty()) people.emplace(arguments.recipe, arguments.makehuman, population.package.population());
+  Samplers samplers(arguments, population.package);
   const evaluate::MemberSet set(population.package, body.package, {.threads = arguments.threads, .quiet = arguments.quiet});
   if (people) options.captures = people->draw(set, set.held_out);
-  std::vector<evaluate::Generated> generated;
-  nlohmann::json runs = nlohmann::json::array();
-  for (const std::string& text : arguments.runs) {
-    const auto [name, path] = named_run(text);
-    const generate::TrainedSampler sampler = generate::TrainedSampler::open(path, arguments.population);
-    verify::DrawOptions draw = arguments.draw;
-    draw.count = std::max(set.training.size(), set.held_out.size());
-    const auto start = std::chrono::steady_clock::now();
-    generated.push_back({name, set.standardisation.standardise(verify::draw_weights(sampler, draw)), sampler.settings.members});
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const nlohmann::json description = train::read_json(train::RunDirectory{path}.run_json());
-    nlohmann::json run{{"name", name}, {"seconds_per_sample", seconds / static_cast<double>(draw.count)}};
-    for (const char* key : {"settings", "parameters", "macs_per_evaluation", "seconds_per_evaluation", "iterations", "train_seconds",
-                            "loss", "validation_loss"}) {
-      if (description.contains(key)) run[key] = description.at(key);
-    }
-    run["posterior_entropy"] = describe_entropy(sampler);
-    runs.push_back(std::move(run));
-  }
+  samplers.draw(set);
+  std::vector<evaluate::Generated>& generated = samplers.generated;
   double noised_db = NAN;
   if (arguments.baselines) {
     noised_db = generated.empty() ? 20 : evaluate::nearest_member_db(set, generated.front());
@@ -173,7 +255,7 @@ void run_generation(const GenerationArguments& arguments) {
   nlohmann::json report = head();
   report["evaluations"] = arguments.draw.steps;
   if (arguments.baselines) report["noised_members_db"] = noised_db;
-  report["runs"] = runs;
+  report["runs"] = samplers.about;
   report["networks"] = networks;
   report.update(evaluate::evaluate_generation(set, generated, options));
   if (!arguments.quiet) {
@@ -226,6 +308,7 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
   command->add_option("--population", arguments->population, "Population that the samplers learnt from")->required();
   command->add_option("--body", arguments->body, "Body that its members stand on")->required();
   command->add_option("--run", arguments->runs, "NAME=RUN of figurine-train sampler; may be given several times");
+  command->add_option("--sampler", arguments->samplers, "NAME=SAMPLER.fgn, sampled as on the device; may be given several times");
   command->add_option("--features", arguments->networks.features,
                       "figurine-features (figurine-train features), to compare pictures by too");
   command->add_option("--lpips", arguments->networks.lpips, "AlexNet with LPIPS' weights, .npz or TorchScript (docs/features.md)");

@@ -82,12 +82,7 @@ double sharpness(const People& people) {
 }
 
 nlohmann::json compare(RowMatrix to_references, RowMatrix samples, RowMatrix references, const BootstrapOptions& bootstrap) {
-  const SampleComparison comparison({std::move(to_references), std::move(samples), std::move(references)});
-  nlohmann::json compared = describe_nearest(comparison, bootstrap);
-  compared["count"] = comparison.size();
-  compared["mmd_psnr_db"] = to_json(bootstrap_interval(
-      comparison.size(), comparison.size(), [&](const Items& items) { return comparison.mmd_psnr_db(items); }, bootstrap));
-  return compared;
+  return describe_draws({std::move(to_references), std::move(samples), std::move(references)}, DistanceUnit::kSquaredError, bootstrap);
 }
 
 nlohmann::json describe(const std::vector<BlendShare>& blends) {
@@ -115,16 +110,13 @@ struct References {
         training_sharpness(sharpness(training)) {}
 };
 
-// Adds "held_out_captures" to a row: as many of its people as there are captures, or fewer if it has fewer; nothing without captures.
+// Adds "held_out_captures" to a row: draws of as many of its people as there are captures; nothing without captures.
 // within: the row's own errors.
 void compare_with_captures(const MemberSet& set, const References& references, const std::string& name, const People& people,
                            const RowMatrix& within, const BootstrapOptions& bootstrap, nlohmann::json& row) {
   if (references.captures.empty()) return;
-  const auto count = static_cast<Eigen::Index>(std::min(people.size(), references.captures.size()));
-  const RowMatrix to_captures =
-      errors_between(set, name + ", captures", {people.begin(), people.begin() + count}, references.captures).leftCols(count);
   row["held_out_captures"] =
-      compare(to_captures, within.topLeftCorner(count, count), references.captures_mse.topLeftCorner(count, count), bootstrap);
+      compare(errors_between(set, name + ", captures", people, references.captures), within, references.captures_mse, bootstrap);
 }
 
 // How far every held-out member is from who it was learnt from: what a perfect sampler of members would leave.
@@ -157,8 +149,7 @@ BootstrapOptions bootstrap_of(const GenerationOptions& options) { return {.repli
 
 nlohmann::json evaluate_row(const MemberSet& set, const References& references, const GenerationNetworks& networks,
                             const Generated& generated, const BootstrapOptions& bootstrap) {
-  const auto training = static_cast<Eigen::Index>(references.training.size()),
-             held_out = static_cast<Eigen::Index>(references.held_out.size());
+  const auto training = static_cast<Eigen::Index>(references.training.size());
   const RowMatrix z = generated.z.topRows(training);
   const People pictures = draw_rows(set, generated.name, z);
   const RowMatrix to_training = errors_between(set, generated.name + ", training", pictures, references.training);
@@ -169,8 +160,8 @@ nlohmann::json evaluate_row(const MemberSet& set, const References& references, 
   row["name"] = generated.name;
   row["samples"] = z.rows();
   row["learnt_from"] = learnt;
-  row["held_out"] = compare(to_held_out.topRows(held_out), within.topLeftCorner(held_out, held_out), references.held_out_mse, bootstrap);
-  row["train"] = compare(to_training.topRows(training), within.topLeftCorner(training, training), references.training_mse, bootstrap);
+  row["held_out"] = compare(to_held_out, within, references.held_out_mse, bootstrap);
+  row["train"] = compare(to_training, within, references.training_mse, bootstrap);
   compare_with_captures(set, references, generated.name, pictures, within, bootstrap, row);
   networks.add_samples(pictures, learnt, row);
   return row;
@@ -251,12 +242,9 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
   compare_with_captures(set, references, "held-out members", references.held_out, references.held_out_mse, bootstrap, held_out);
   networks.add_held_out_novelty(held_out);
   // Training members as if they had been sampled: what "within 1 dB of training members" is measured from.
-  const auto count = static_cast<Eigen::Index>(std::min(set.held_out.size(), set.training.size()));
-  const RowMatrix as_samples = to_training.transpose().topRows(count).leftCols(count);
   nlohmann::json members{{"name", "training members"},
-                         {"samples", count},
-                         {"held_out", compare(as_samples, references.training_mse.topLeftCorner(count, count),
-                                              references.held_out_mse.topLeftCorner(count, count), bootstrap)}};
+                         {"samples", set.training.size()},
+                         {"held_out", compare(to_training.transpose(), references.training_mse, references.held_out_mse, bootstrap)}};
   compare_with_captures(set, references, "training members", references.training, references.training_mse, bootstrap, members);
   networks.add_training_as_samples(members);
   rows.push_back(std::move(members));

@@ -42,11 +42,7 @@ GenerationNetworks::GenerationNetworks(const ComparingNetworks& networks, const 
 }
 
 nlohmann::json GenerationNetworks::compare_distances(RowMatrix to_references, RowMatrix samples, RowMatrix references) const {
-  const SampleComparison comparison({std::move(to_references), std::move(samples), std::move(references)});
-  nlohmann::json compared = describe_nearest(comparison, bootstrap_);
-  compared["mmd"] = to_json(
-      bootstrap_interval(comparison.size(), comparison.size(), [&](const Items& items) { return comparison.mmd(items); }, bootstrap_));
-  return compared;
+  return describe_draws({std::move(to_references), std::move(samples), std::move(references)}, DistanceUnit::kOther, bootstrap_);
 }
 
 void GenerationNetworks::compare_features(const FeatureNetwork& network, const RowMatrix& samples, const RowMatrix& references,
@@ -65,10 +61,8 @@ void GenerationNetworks::add_samples(const People& samples, Eigen::Index learnt,
     const std::string& name = networks_.perceptual[i]->name();
     const PeopleDistances own = measure_distances(*networks_.perceptual[i], samples, references_, threads_);
     const RowMatrix &to = own.to_references, &within = own.within, &references = distances_[i];
-    row["train"]["perceptual"][name] =
-        compare_distances(to.topLeftCorner(n, n), within.topLeftCorner(n, n), references.topLeftCorner(n, n));
-    row["held_out"]["perceptual"][name] =
-        compare_distances(to.block(0, n, h, h), within.topLeftCorner(h, h), references.bottomRightCorner(h, h));
+    row["train"]["perceptual"][name] = compare_distances(to.leftCols(n), within, references.topLeftCorner(n, n));
+    row["held_out"]["perceptual"][name] = compare_distances(to.rightCols(h), within, references.bottomRightCorner(h, h));
     row["novelty"]["perceptual"][name] = describe(measure_novelty(to.leftCols(learnt), references.topLeftCorner(learnt, learnt)));
   }
   for (size_t i = 0; i < networks_.features.size(); ++i) {
@@ -84,7 +78,7 @@ void GenerationNetworks::add_training_as_samples(nlohmann::json& row) const {
   for (size_t i = 0; i < networks_.perceptual.size(); ++i) {
     const RowMatrix& all = distances_[i];
     row["held_out"]["perceptual"][networks_.perceptual[i]->name()] =
-        compare_distances(all.block(0, n, count, count), all.topLeftCorner(count, count), all.block(n, n, count, count));
+        compare_distances(all.topRightCorner(n, h), all.topLeftCorner(n, n), all.bottomRightCorner(h, h));
   }
   for (size_t i = 0; i < networks_.features.size(); ++i) {
     compare_features(*networks_.features[i], features_[i].topRows(count * pictures_),

@@ -115,4 +115,17 @@ SampleMetrics sample_metrics(const SampleComparison& comparison) {
   return {comparison.mmd(all), comparison.coverage_percent(all), one_nna, std::abs(one_nna - 50)};
 }
 
+std::vector<SampleComparison> disjoint_draws(const SampleDistances& distances) {
+  const Eigen::Index size = distances.to_references.cols(), samples = distances.to_references.rows();
+  if (size == 0 || samples < size || distances.samples.rows() != samples || distances.samples.cols() != samples) {
+    throw InputError("sample metrics: " + std::to_string(samples) + " samples cannot be drawn as " + std::to_string(size));
+  }
+  std::vector<SampleComparison> draws;
+  for (Eigen::Index first = 0; first + size <= samples; first += size) {
+    draws.push_back(SampleComparison(
+        {distances.to_references.middleRows(first, size), distances.samples.block(first, first, size, size), distances.references}));
+  }
+  return draws;
+}
+
 }  // namespace figurine::evaluate

@@ -16,6 +16,8 @@
 // mislead).
 #pragma once
 
+#include <vector>
+
 #include "toolchain/evaluate/bootstrap.h"
 #include "toolchain/evaluate/weight_space.h"
 
@@ -56,5 +58,10 @@ struct SampleMetrics {
   double one_nna_off_ideal = 0;  // |1-NNA - 50|, in percentage points
 };
 SampleMetrics sample_metrics(const SampleComparison& comparison);  // of all items
+
+// S >= R samples in disjoint draws of R each, in their order: [S / R]; what is left over is left out. Which seeds happen to be drawn moves
+// COV by several points where references are few, and a mean over draws less so. It does not say more about the references. Throws
+// InputError as SampleComparison does, or if there are fewer samples than references.
+std::vector<SampleComparison> disjoint_draws(const SampleDistances& distances);
 
 }  // namespace figurine::evaluate

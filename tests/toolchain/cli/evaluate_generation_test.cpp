@@ -75,6 +75,38 @@ TEST(EvaluateGeneration, HoldsRowsAgainstBothPartsThroughANetworkToo) {
   for (const char* word : {"LPIPS", "FID"}) EXPECT_EQ(report.dump().find(word), std::string::npos) << "it is neither";
 }
 
+// What ships can be judged by whoever has the package: no run folder is needed.
+TEST(EvaluateGeneration, JudgesASamplersPackageByTheDevicesOwnIntegers) {
+  const TestFolder folder;
+  tests::write_test_packages(folder);
+  evaluate::test::write_people(folder.path("people.fgn"), {.training = 4, .validation = 1, .test = 1});
+  const ProgramRun made = tests::run_shell(
+      FIGURINE_TRAIN
+      " sampler --quiet --population people.fgn --size small --blocks 1 --rank 3 --members 3 --iterations 2 -o run && " FIGURINE_TRAIN
+      " pack run --quiet --body body.fgn -o sampler.fgn",
+      folder);
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const ProgramRun run = judge(folder, "--population people.fgn --no-baselines --sampler ours=sampler.fgn --run float=run");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json report = report_of(folder);
+  const nlohmann::json &device = row_of(report, "ours"), &network = row_of(report, "float");
+  EXPECT_EQ(device.at("learnt_from"), 3);
+  EXPECT_EQ(network.at("learnt_from"), 3);
+  EXPECT_EQ(device.at("held_out").at("draws").at("count"), 2) << "four people, two held out";
+  const double of_device = device.at("novelty").at("weights").at("median_nearest"),
+               of_network = network.at("novelty").at("weights").at("median_nearest");
+  EXPECT_NEAR(of_device / of_network, 1, 0.02) << "the same people but for the rounding of matrices and directions";
+  EXPECT_NE(of_device, of_network);
+  EXPECT_EQ(report.at("runs").at(0).at("package").at("name"), "people");
+  EXPECT_FALSE(report.at("runs").at(1).contains("package"));
+
+  evaluate::test::write_people(folder.path("others.fgn"), {.training = 4, .validation = 1, .test = 1, .other_from = 0});
+  const ProgramRun refused = judge(folder, "--population others.fgn --sampler sampler.fgn");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(refused.error_lines(), 1u) << refused.err;
+  EXPECT_NE(refused.err.find("sampler.fgn: population: learnt from "), std::string::npos) << refused.err;
+}
+
 TEST(EvaluateGeneration, BadInputGivesOneLineAndNoReport) {
   const TestFolder folder;
   tests::write_test_packages(folder);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
@@ -197,6 +198,33 @@ TEST(GenerationNetworks, TheOrderOfSamplesDoesNotMatter) {
     expected += nearest / double(held_out.size());
   }
   EXPECT_NEAR(value(row.at("held_out").at("perceptual").at("pixels").at("mmd")), expected, 1e-12 * expected);
+}
+
+// Eight samples are four draws of two held-out people: the interval is the first one's, the means are of all.
+TEST(GenerationNetworks, MoreSamplesThanHeldOutPeopleAreMoreDraws) {
+  const People training = random_people(8, 12), held_out = random_people(2, 13), samples = random_people(8, 14);
+  const ComparingNetworks networks = both();
+  const auto judged = [&](const People& people, const People& references) {
+    nlohmann::json row;
+    GenerationNetworks(networks, training, references, 1, kBootstrap).add_samples(people, 8, row);
+    return row.at("held_out").at("perceptual").at("pixels");
+  };
+  const nlohmann::json found = judged(samples, held_out), &draws = found.at("draws");
+  EXPECT_EQ(found.at("count"), 2);
+  EXPECT_EQ(draws.at("count"), 4);
+  std::map<std::string, double> sums;
+  for (size_t d = 0; d < 4; ++d) {
+    People turned = samples;
+    std::rotate(turned.begin(), turned.begin() + std::ptrdiff_t(2 * d), turned.end());
+    const nlohmann::json one = judged(turned, held_out);
+    for (const char* key : {"mmd", "coverage_percent", "one_nna_percent"}) sums[key] += value(one.at(key)) / 4;
+    if (d == 0) {
+      EXPECT_EQ(one, found);
+    }
+  }
+  for (const auto& [key, mean] : sums) EXPECT_NEAR(draws.at(key).get<double>(), mean, 1e-12 * mean) << key;
+  EXPECT_NE(draws.at("mmd"), found.at("mmd").at("value"));
+  EXPECT_FALSE(judged(samples, random_people(5, 15)).contains("draws")) << "there is one";
 }
 
 TEST(GenerationNetworks, LeaveTheFrechetDistanceOutWherePicturesAreFew) {

@@ -146,6 +146,24 @@ TEST(SampleMetrics, OfSomeItemsAreThoseOfTheirMatrices) {
   EXPECT_EQ(all.one_nna_percent({some, others}), part.one_nna_percent(part.all()));
 }
 
+TEST(SampleMetrics, DrawsAreDisjointAndInOrder) {
+  const RowMatrix samples = tests::random_rows(8, 3, 12), references = tests::random_rows(3, 3, 13);
+  const std::vector<SampleComparison> draws =
+      disjoint_draws({apart(samples, references), apart(samples, samples), apart(references, references)});
+  ASSERT_EQ(draws.size(), 2u) << "two of eight are left over";
+  for (Eigen::Index d = 0; d < 2; ++d) {
+    const SampleMetrics found = sample_metrics(draws[size_t(d)]),
+                        expected = sample_metrics(compare(samples.middleRows(3 * d, 3), references));
+    EXPECT_EQ(found.mmd, expected.mmd);
+    EXPECT_EQ(found.coverage_percent, expected.coverage_percent);
+    EXPECT_EQ(found.one_nna_percent, expected.one_nna_percent);
+  }
+  EXPECT_NE(sample_metrics(draws[0]).mmd, sample_metrics(draws[1]).mmd);
+  EXPECT_THROW(disjoint_draws({apart(references, samples), apart(references, references), apart(samples, samples)}), InputError)
+      << "fewer samples than references";
+  EXPECT_THROW(disjoint_draws({apart(samples, references), apart(references, references), apart(references, references)}), InputError);
+}
+
 TEST(SampleMetrics, RefuseSetsThatSayNothing) {
   const RowMatrix two = RowMatrix::Ones(2, 2), none(0, 0);
   EXPECT_NE(message_of({none, none, none}).find("no samples"), std::string::npos);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -18,6 +19,7 @@
 #include "toolchain/error.h"
 #include "toolchain/generate/quantised_sampler.h"
 #include "toolchain/generate/sampler_trainer.h"
+#include "toolchain/verify/device_samples.h"
 #include "toolchain/verify/float_sampler.h"
 #include "toolchain/verify/sampling_error.h"
 
@@ -157,11 +159,14 @@ TEST_F(PackSampler, SeedsOfTheDeviceAreSeedsOfTheTrainersFloats) {
   ASSERT_TRUE(device.ok());
   const TrainedSampler trained = TrainedSampler::open(path("run"));
   const evaluate::RowMatrix floats = verify::draw_weights(trained, {.first_seed = 3, .count = 2, .steps = 8});
+  const evaluate::RowMatrix sampled = verify::sample_weights(opened->sampler(), {.first_seed = 3, .count = 2, .quiet = true});
+  ASSERT_EQ(sampled.cols(), floats.cols());
   for (uint64_t seed = 3; seed < 5; ++seed) {
     SampledAvatar person;
     ASSERT_TRUE((*device)->sample({.seed = seed}, person).ok());
     std::vector<double> weights(static_cast<size_t>(floats.cols()));
     evaluate::read_weights(person.avatar(), weights);
+    EXPECT_TRUE(std::ranges::equal(weights, sampled.row(static_cast<Eigen::Index>(seed - 3)))) << "as evaluations see them";
     const evaluate::RowVector mean = trained.space->standardisation().mean();
     const auto row = floats.row(static_cast<Eigen::Index>(seed - 3));
     const double power = (row - mean).squaredNorm();
