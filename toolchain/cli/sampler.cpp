@@ -1,11 +1,9 @@
 // figurine-train sampler: the diffusion model over a population's weights.
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
-#include <thread>
 
 #include "toolchain/cli/commands.h"
 #include "toolchain/generate/sampler_trainer.h"
@@ -50,7 +48,7 @@ void add_sampler_command(CLI::App& app) {
   auto arguments = std::make_shared<SamplerArguments>();
   generate::SamplerRequest& request = arguments->request;
   generate::SamplerSettings& settings = request.settings;
-  settings.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  settings.threads = 0;
   CLI::App* command = app.add_subcommand("sampler", "Train the diffusion model that samples the weights of new avatars");
   command->add_option("--population", request.population, "Package to learn from: its training part alone")->required();
   command->add_option("-o,--output", request.run, "Folder of the run")->required();
@@ -87,7 +85,8 @@ void add_sampler_command(CLI::App& app) {
       ->check(CLI::Range(1e-9, 100.0));
   command->add_option("--seed", settings.seed, "Of weights, order and noise (default 1)");
   command->add_flag("--bf16,!--no-bf16", settings.bf16, "Matrix products in bfloat16 (default: float)");
-  command->add_option("--threads", settings.threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->add_option("--threads", settings.threads, "Default: all cores; with --resume as many as the run began with")
+      ->check(CLI::Range(1, 256));
   CLI::Option* iterations =
       command->add_option("--iterations", arguments->iterations, "Budget (default 10000)")->check(CLI::PositiveNumber);
   command->add_option("--minutes", arguments->minutes, "Budget in minutes of training")->check(CLI::PositiveNumber)->excludes(iterations);

@@ -74,15 +74,14 @@ void GenerationNetworks::add_samples(const People& samples, Eigen::Index learnt,
 }
 
 void GenerationNetworks::add_training_as_samples(nlohmann::json& row) const {
-  const Eigen::Index n = training_, count = std::min(training_, held_out_);
+  const Eigen::Index n = training_, h = held_out_;
   for (size_t i = 0; i < networks_.perceptual.size(); ++i) {
     const RowMatrix& all = distances_[i];
     row["held_out"]["perceptual"][networks_.perceptual[i]->name()] =
         compare_distances(all.topRightCorner(n, h), all.topLeftCorner(n, n), all.bottomRightCorner(h, h));
   }
   for (size_t i = 0; i < networks_.features.size(); ++i) {
-    compare_features(*networks_.features[i], features_[i].topRows(count * pictures_),
-                     features_[i].middleRows(n * pictures_, count * pictures_), row["held_out"]);
+    compare_features(*networks_.features[i], features_[i].topRows(h * pictures_), features_[i].bottomRows(h * pictures_), row["held_out"]);
   }
 }
 

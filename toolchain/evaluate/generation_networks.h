@@ -26,7 +26,7 @@ class GenerationNetworks {
   // Adds to a row's "held_out" and "train" the objects "perceptual", "frechet" and "kid", and to its "novelty" the object "perceptual";
   // nothing without networks. samples: at least max(N, H). learnt: the first so many training members, whom the novelty audit looks for.
   void add_samples(const People& samples, Eigen::Index learnt, nlohmann::json& row) const;
-  void add_training_as_samples(nlohmann::json& row) const;  // the first min(N, H), to "held_out"
+  void add_training_as_samples(nlohmann::json& row) const;  // to "held_out", in draws of H; needs N >= H
   void add_held_out_novelty(nlohmann::json& row) const;
 
  private:

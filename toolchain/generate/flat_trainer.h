@@ -46,9 +46,9 @@ struct FlatTraining {
   uint32_t batch = 32;
   train::Schedule schedule;
   double beta1 = 0.9, beta2 = 0.999, weight_decay = 0;
-  double ema = 0.999;  // decay of the moving average
-  double checkpoint_period_s = 60;
-  uint64_t stop_after = 0;  // interrupt before this iteration, as Ctrl-C would; 0: never
+  double ema = 0.999;               // decay of the moving average
+  double checkpoint_period_s = 60;  // or 20 times what the last one took, if that is longer
+  uint64_t stop_after = 0;          // interrupt before this iteration, as Ctrl-C would; 0: never
   bool quiet = false;
 };
 

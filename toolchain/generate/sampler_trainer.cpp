@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
+#include <thread>
 
 #include "figurine/noise_level.h"
 #include "toolchain/error.h"
@@ -196,10 +197,14 @@ Plan make_plan(const SamplerRequest& request, const train::PackageFile& populati
   if (exists && !request.resume) throw InputError(request.run + ": holds a run already; --resume goes on with it");
   if (!exists && request.resume) throw InputError(request.run + ": no run to resume (run.json is missing)");
   Plan plan{.settings = request.settings, .description = {}};
-  if (!exists) return plan;
+  if (!exists) {
+    if (plan.settings.threads == 0) plan.settings.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+    return plan;
+  }
   plan.description = read_run(run);
   check_population(plan.description, population, run, request.population);
   plan.settings = sampler_settings_from_json(plan.description.at("settings"), run.run_json());
+  if (request.settings.threads > 0) plan.settings.threads = request.settings.threads;
   plan.finished = plan.description.value("status", "") == "finished";
   return plan;
 }
@@ -223,14 +228,15 @@ void share_plan(Plan& plan, ProcessGroup& group, const SamplerRequest& request, 
   if (!group.leads()) {
     if (!told.at("new").get<bool>()) {
       plan.settings = sampler_settings_from_json(told.at("settings"), group.name());
+      if (request.settings.threads > 0) plan.settings.threads = request.settings.threads;
     } else if (without_threads(told.at("settings")) == without_threads(to_json(request.settings))) {
       plan.settings = request.settings;
+      if (plan.settings.threads == 0) plan.settings.threads = told.at("settings").at("threads").get<uint32_t>();
     } else {
       throw InputError(group.name() + ": was asked for other settings than rank 0");
     }
     plan.finished = told.at("finished").get<bool>();
   }
-  plan.settings.threads = request.settings.threads;
 }
 
 SamplerResult result_of(const nlohmann::json& description) {

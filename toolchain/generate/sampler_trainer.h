@@ -32,6 +32,8 @@ struct SamplerRequest {
   std::string run;         // folder to write
   SamplerSettings settings;
   std::string command;  // as typed, for run.json
+  // settings.threads: 0 for all cores, or as many as a resumed run began with. Two threads are many times slower than one where another
+  // process wants the second core, so that going on must not take more of them unasked.
   bool resume = false;  // goes on by the run's own settings; only settings.threads counts
   bool quiet = false;
   double checkpoint_period_s = 60;
