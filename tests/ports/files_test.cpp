@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "ports/linux/folder_lock.h"
+
 namespace figurine::ports {
 namespace {
 
@@ -107,6 +109,19 @@ TEST_F(Files, DeviceIsNeitherMappedNorReplaced) {
   struct stat info;
   ASSERT_EQ(::stat("/dev/null", &info), 0);
   EXPECT_TRUE(S_ISCHR(info.st_mode));
+}
+
+TEST_F(Files, OneLockHoldsAFolder) {
+  {
+    Result<FolderLock> lock = FolderLock::acquire(folder_);
+    ASSERT_TRUE(lock.ok()) << lock.status().message();
+    EXPECT_EQ(FolderLock::acquire(folder_).status().message(), folder_ + ": another process is at work in it");
+    const FolderLock moved = std::move(*lock);
+    EXPECT_FALSE(FolderLock::acquire(folder_).ok());
+    EXPECT_EQ(entries(), 0u) << "it leaves no file";
+  }
+  EXPECT_TRUE(FolderLock::acquire(folder_).ok());
+  EXPECT_NE(FolderLock::acquire(path("nowhere")).status().message().find("nowhere: cannot be opened"), std::string::npos);
 }
 
 TEST_F(Files, WriteIntoMissingFolderLeavesNothing) {

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "figurine/noise_level.h"
+#include "ports/linux/folder_lock.h"
 #include "toolchain/error.h"
 #include "toolchain/generate/autoencoder.h"
 #include "toolchain/generate/flat_trainer.h"
@@ -343,6 +344,9 @@ SamplerResult train_sampler(const SamplerRequest& request) {
   const train::RunDirectory run{request.run};
   ProcessGroup group(request.place, request.rank_timeout_s);
   const train::PackageFile population = train::open_package(request.population, PackageKind::kPopulation);
+  std::optional<ports::FolderLock> lock;  // of two trainings in one folder the slower one would win
+  const auto lock_run = [&] { lock.emplace(value_or_throw(ports::FolderLock::acquire(request.run), "cannot train")); };
+  if (group.leads() && std::filesystem::exists(run.run_json())) lock_run();
   Plan plan = group.leads() ? make_plan(request, population) : Plan{};
   share_plan(plan, group, request, population);
   if (plan.finished) return group.leads() ? result_of(plan.description) : SamplerResult{.was_finished = true};
@@ -368,6 +372,7 @@ SamplerResult train_sampler(const SamplerRequest& request) {
     std::error_code error;
     std::filesystem::create_directories(request.run, error);
     if (error) throw InputError(request.run + ": cannot be created: " + error.message());
+    lock_run();
     plan.description = describe(request, settings, population, dimension, static_cast<size_t>(members.training.rows()),
                                 static_cast<size_t>(members.validation.rows()));
     train::write_json(run.run_json(), plan.description);

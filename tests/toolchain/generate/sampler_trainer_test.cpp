@@ -9,10 +9,12 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "ports/linux/folder_lock.h"
 #include "tests/toolchain/generate/small_people.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/tensor_file.h"
+#include "toolchain/train/threads.h"
 
 namespace figurine::generate {
 namespace {
@@ -92,6 +94,34 @@ TEST_F(SamplerTraining, GoesOnWithTheSameBits) {
   other.settings.seed = 2;
   train_sampler(other);
   EXPECT_NE(weights("other"), weights("whole"));
+}
+
+TEST_F(SamplerTraining, OneProcessTrainsARun) {
+  SamplerRequest cut = request("cut");
+  cut.stop_after = 3;
+  EXPECT_THROW(train_sampler(cut), train::Interrupted);
+  cut.resume = true, cut.stop_after = 0;
+  {
+    const auto lock = ports::FolderLock::acquire(path("cut"));
+    ASSERT_TRUE(lock.ok());
+    EXPECT_EQ(refusal(cut), "cannot train: " + path("cut") + ": another process is at work in it");
+  }
+  EXPECT_EQ(train_sampler(cut).iteration, 60u);
+}
+
+TEST_F(SamplerTraining, GoesOnWithItsOwnThreadsUnlessToldOtherwise) {
+  SamplerRequest cut = request("cut");
+  cut.settings.threads = 1, cut.stop_after = 3;
+  EXPECT_THROW(train_sampler(cut), train::Interrupted);
+  cut.resume = true, cut.stop_after = 5;
+  for (const auto& [asked, used] : {std::pair{0u, 1}, {2u, 2}}) {
+    train::use_threads(3);
+    cut.settings.threads = asked;
+    EXPECT_THROW(train_sampler(cut), train::Interrupted);
+    EXPECT_EQ(at::get_num_threads(), used) << "asked for " << asked;
+    cut.stop_after += 2;
+  }
+  train::use_threads(1);
 }
 
 // Stopped in the autoencoder, and in the denoiser that follows.
