@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "toolchain/error.h"
+#include "toolchain/model/convolution.h"
 #include "toolchain/train/random.h"
 #include "toolchain/train/tensor_file.h"
 
@@ -85,7 +86,7 @@ FeatureOutput run_feature_network(const torch::Tensor& weights, const torch::Ten
   torch::Tensor x = (pictures - 0.5) * 4;
   size_t next = 0;
   for (const FeatureStage& stage : kFeatureStages) {
-    x = torch::relu(torch::conv2d(x, part(weights, next), part(weights, next + 1), stage.stride, stage.kernel / 2));
+    x = torch::relu(model::conv2d(x, part(weights, next), part(weights, next + 1), stage.stride, stage.kernel / 2));
     out.activations.push_back(x);
     next += 2;
   }

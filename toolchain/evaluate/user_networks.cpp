@@ -11,6 +11,7 @@
 #include "toolchain/body/npz.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/perceptual_embedding.h"
+#include "toolchain/model/convolution.h"
 
 namespace figurine::evaluate {
 
@@ -138,7 +139,7 @@ std::vector<float> LpipsAlex::embedding_of(const RgbView& picture) const {
   std::vector<torch::Tensor> activations;
   for (size_t l = 0; l < std::size(kAlexNet); ++l) {
     if (kAlexNet[l].pooled_before) x = torch::max_pool2d(x, 3, 2);
-    x = torch::relu(torch::conv2d(x, weights_->weight[l], weights_->bias[l], kAlexNet[l].stride, kAlexNet[l].padding));
+    x = torch::relu(model::conv2d(x, weights_->weight[l], weights_->bias[l], kAlexNet[l].stride, kAlexNet[l].padding));
     activations.push_back(x);
   }
   return perceptual_embedding(activations, weights_->distance);
@@ -156,7 +157,7 @@ struct InceptionFeatures::Script {
     const torch::jit::GraphOptimizerEnabledGuard as_written(false);
     torch::jit::IValue value;
     try {
-      value = module.forward({pictures});
+      value = module.forward({pictures.contiguous(at::MemoryFormat::ChannelsLast)});  // toolchain/model/convolution.h
     } catch (const std::exception& error) {
       throw InputError(file + ": forward: " + reason(error));
     }

@@ -5,6 +5,7 @@
 
 #include "toolchain/error.h"
 #include "toolchain/generate/tensors.h"
+#include "toolchain/model/convolution.h"
 
 namespace figurine::generate {
 
@@ -63,11 +64,11 @@ struct Reader {
   const torch::Tensor& next() { return parameters.leaf(at++); }
   torch::Tensor convolution(const torch::Tensor& x, int64_t stride) {
     const torch::Tensor &weight = next(), &bias = next();
-    return torch::conv2d(x, weight, bias, stride, /*padding=*/1);
+    return model::conv2d(x, weight, bias, stride, /*padding=*/1);
   }
   torch::Tensor transposed(const torch::Tensor& x) {
     const torch::Tensor &weight = next(), &bias = next();
-    return torch::conv_transpose2d(x, weight, bias, /*stride=*/2, /*padding=*/1);
+    return model::conv_transpose2d(x, weight, bias, /*stride=*/2, /*padding=*/1);
   }
   torch::Tensor residual_block(const torch::Tensor& x) {
     torch::Tensor y = x;

@@ -83,7 +83,7 @@ TEST(EvaluateGeneration, JudgesASamplersPackageByTheDevicesOwnIntegers) {
   const ProgramRun made = tests::run_shell(
       FIGURINE_TRAIN
       " sampler --quiet --population people.fgn --size small --blocks 1 --rank 3 --members 3 --iterations 2 -o run && " FIGURINE_TRAIN
-      " pack run --quiet --body body.fgn -o sampler.fgn",
+      " pack run --body body.fgn -o sampler.fgn",
       folder);
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const ProgramRun run = judge(folder, "--population people.fgn --no-baselines --sampler ours=sampler.fgn --run float=run");

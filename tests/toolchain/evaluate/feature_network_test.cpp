@@ -56,6 +56,33 @@ TEST(FigurineFeatures, FeaturesHaveOneLengthAndTellPicturesApart) {
   EXPECT_GT((features.row(0) - features.row(1)).norm(), 1e-3);
 }
 
+// Memory as a process has it after some work: freed blocks of all sizes that the network's copies have, full of NaN.
+void leave_nan_behind() {
+  std::vector<torch::Tensor> blocks;
+  for (const int64_t channels : {3, 16, 24, 32, 48, 64, 72, 80, 96}) {
+    for (const int64_t values : {1, 25 * 16, 9 * 24, 9 * 48, 9 * 80, 9 * 96, 64, 256, 1024, 4096, 8 * 64, 8 * 256, 8 * 1024, 8 * 4096}) {
+      for (int copy = 0; copy < 3; ++copy) blocks.push_back(torch::full({channels * values}, NAN));
+    }
+  }
+}
+
+TEST(FigurineFeatures, DoNotDependOnWhatMemoryHeldBefore) {
+  const torch::Tensor weights = initial_feature_weights(3).requires_grad_(),
+                      pictures = torch::full({8, 3, kFeatureSide_px, kFeatureSide_px}, 0.25);
+  const auto run = [&] {
+    const FeatureOutput output = run_feature_network(weights, pictures);
+    return std::pair{output.features.detach(), torch::autograd::grad({output.features.sum()}, {weights})[0]};
+  };
+  const auto [features, gradient] = run();
+  ASSERT_TRUE(features.isfinite().all().item<bool>() && gradient.isfinite().all().item<bool>());
+  for (int i = 0; i < 3; ++i) {
+    leave_nan_behind();
+    const auto [again, gradient_again] = run();
+    EXPECT_TRUE(again.equal(features));
+    EXPECT_TRUE(gradient_again.equal(gradient));
+  }
+}
+
 TEST(FigurineFeatures, DistanceIsZeroForEqualPicturesAndSymmetric) {
   const FigurineFeatures network = make_network();
   const RgbPictures pictures = rectangles(160, 160, 3, 2);
