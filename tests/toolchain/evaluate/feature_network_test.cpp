@@ -130,7 +130,7 @@ TEST(FigurineFeatures, DistanceIsThatOfTheStages) {
   }
   double expected = 0;
   for (size_t l = 0; l < kFeatureLayers; ++l) {
-    const torch::Tensor a = layers[0][l].to(torch::kFloat64), b = layers[1][l].to(torch::kFloat64);
+    const torch::Tensor a = layers[0][l].to(torch::kFloat64).contiguous(), b = layers[1][l].to(torch::kFloat64).contiguous();
     const int64_t channels = a.size(1), positions = a.size(2) * a.size(3);
     const double *x = a.data_ptr<double>(), *y = b.data_ptr<double>();
     for (int64_t p = 0; p < positions; ++p) {
