@@ -13,7 +13,7 @@ import pathlib
 import re
 import sys
 
-from variants_report import losses
+from variants_report import merged_losses
 
 
 def read(path):
@@ -51,10 +51,7 @@ def main():
     generation[name] = head | without_paths(read(folder / "generation.json"))
     write(output / "generation.json", generation)
     losses_path = output / f"sampler_loss_{name}.csv"
-    runs = [run for run in ("basis", "layer") if (folder / run).exists()]
-    kept = [line for line in losses_path.read_text().splitlines()[1:] if line.split(",")[0] not in runs] if losses_path.exists() else []
-    head_line, *rows = losses(folder, runs).splitlines()
-    losses_path.write_text("\n".join([head_line, *kept, *rows]) + "\n")
+    losses_path.write_text(merged_losses(losses_path, folder, [run for run in ("basis", "layer") if (folder / run).exists()]))
 
     same = {"same_on_all_cpus": same_on_all_cpus((folder / "golden.txt").read_text(), name)}
     measured, timed = read(folder / "sampling.json"), read(folder / "timed.json")

@@ -8,7 +8,8 @@
 # Writes the population's object in docs/results/generation.json, the trainings' losses as docs/results/sampler_loss_NAME.csv,
 # docs/sampler_variants_NAME.jpg and docs/sampler_curves.png.
 #
-# Environment: ITERATIONS (4000) of each training, AUTOENCODER_ITERATIONS (3000) of the one before `latent`; DOCS (docs), where all this is
+# Environment: RUNS ("layer flat latent basis layer_250 ...", all), which of them are trained and judged: the others' rows stay as they are, and say
+# from when; ITERATIONS (4000) of each training, AUTOENCODER_ITERATIONS (3000) of the one before `latent`; DOCS (docs), where all this is
 # written: for a try, name another folder that holds a copy of docs/results.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
@@ -20,17 +21,16 @@ population=samples/populations/$name.fgn body=samples/populations/${name}_body.f
 for file in "$population" "$body" "$features"; do [ -r "$file" ] || die "variants: $file: no such file"; done
 . scripts/experiments/tools.sh
 
-runs=(layer flat latent basis)
+read -ra runs <<< "${RUNS:-layer flat latent basis layer_250 basis_250 layer_100 basis_100 layer_50 basis_50}"
 common=(--size small --learning-rate 5e-4 --iterations "$iterations")
-learn "$folder/layer" --variant layer "${common[@]}"
-learn "$folder/flat" --variant flat --chunk 512 "${common[@]}"
-learn "$folder/latent" --variant latent --autoencoder-iterations "$autoencoder_iterations" "${common[@]}"
-learn "$folder/basis" --variant basis "${common[@]}"
-for members in 250 100 50; do
-  for variant in layer basis; do
-    runs+=("${variant}_$members")
-    learn "$folder/${variant}_$members" --variant "$variant" --members "$members" "${common[@]}"
-  done
+for run in "${runs[@]}"; do
+  own=(--variant "${run%%_*}")
+  case $run in
+    flat) own+=(--chunk 512) ;;
+    latent) own+=(--autoencoder-iterations "$autoencoder_iterations") ;;
+    *_*) own+=(--members "${run#*_}") ;;
+  esac
+  learn "$folder/$run" "${own[@]}" "${common[@]}"
 done
 options=()
 for run in "${runs[@]}"; do options+=(--run "$run=$folder/$run"); done

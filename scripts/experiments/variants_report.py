@@ -32,20 +32,44 @@ def losses(folder, runs):
     return "\n".join(lines) + "\n"
 
 
+def merged_losses(path, folder, runs):
+    """Those of the runs, and what the file has of others."""
+    kept = [line for line in path.read_text().splitlines()[1:] if line.split(",")[0] not in runs] if path.exists() else []
+    head, *rows = losses(folder, runs).splitlines()
+    return "\n".join([head, *rows, *kept]) + "\n"
+
+
+def keep_others(before, now):
+    """Rows of trainings that were not judged this time, with the commit and date that they are from, if they are of the same population."""
+    if before.get("population_hash") != now["population_hash"]:
+        return
+    trained = {run["name"] for run in now["runs"]}
+    for run in before["runs"]:
+        if run["name"] in trained:
+            continue
+        row = next(row for row in before["rows"] if row["name"] == run["name"])
+        row.setdefault("kept_from", {"commit": before["commit"], "date": before["date"]})
+        now["rows"].insert(len(now["runs"]), row)
+        now["runs"].append(run)
+
+
 def main():
     folder, name, output, command, runs = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), sys.argv[4], sys.argv[5:]
     report = json.loads((folder / "generation.json").read_text())
     del report["command"]  # of this machine's folders
     path = output / "generation.json"
     generation = json.loads(path.read_text()) if path.exists() else {}
+    before = generation.get(name, {})
     generation[name] = {
         "command": command,
         "commit": os.environ.get("FIGURINE_COMMIT", "unknown"),
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
     } | report
+    keep_others(before, generation[name])
     write(path, json.dumps(generation, indent=2, sort_keys=True) + "\n")
 
-    write(output / f"sampler_loss_{name}.csv", losses(folder, runs))
+    losses_path = output / f"sampler_loss_{name}.csv"
+    write(losses_path, merged_losses(losses_path, folder, runs))
 
 
 if __name__ == "__main__":
