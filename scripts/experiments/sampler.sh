@@ -4,7 +4,7 @@
 #   scripts/experiments/sampler.sh edge [FOLDER]        FOLDER (default out/sampler) keeps every step
 #
 # May be stopped and killed at any time; called again it goes on. Trains `basis`, which ships (3,000 iterations, 15 minutes of a core), and `layer`,
-# the paper's, for the table. Writes samples/samplers/edge.fgn, docs/sampler_edge.jpg, docs/sampler_trace_edge.jpg, docs/results/sampling.json,
+# the paper's, for the table. Writes samples/samplers/edge.fgn, the pictures docs/sampler_{edge,trace_edge,rows_edge}.jpg, docs/results/sampling.json,
 # docs/results/sampler_loss_edge.csv and, under the population's name, docs/results/generation.json.
 #
 # Environment: MINUTES (60) of a core for `layer`; SHIPPED (empty): if set, `basis` is not trained anew, the package that ships is judged, and
@@ -36,6 +36,8 @@ if [ -z "${SHIPPED:-}" ]; then
 fi
 step "evaluating"
 judge --sampler "basis=$package" --run "layer=$folder/layer" -o "$folder/generation.json"
+train evaluate generation --population "$population" --body "$body" --no-baselines --replicates 10 --sampler "basis=$package" --run "layer=$folder/layer" \
+  --sheet "docs/sampler_rows_$name.jpg"
 
 # 64 seeds, counted up from 0, none left out.
 mkdir -p "$folder/people"
