@@ -66,7 +66,7 @@ TEST(Autoencoder, LossIsTheErrorAndTheDivergenceOfThePosterior) {
     return Autoencoding(autoencoder, settings(kl_weight), training, RowMatrix(0, kWidth)).loss(0, share).item<double>();
   };
   const Autoencoder::Posterior posterior = autoencoder->posterior(to_tensor(training));
-  const RowMatrix mean = to_rows(posterior.mean.view({4, 18})), log_variance = to_rows(posterior.log_variance.view({4, 18}));
+  const RowMatrix mean = to_rows(posterior.mean.reshape({4, 18})), log_variance = to_rows(posterior.log_variance.reshape({4, 18}));
   double divergence = 0;
   for (Eigen::Index i = 0; i < mean.size(); ++i) {
     const double m = mean.data()[i], v = std::exp(log_variance.data()[i]);
