@@ -1,5 +1,5 @@
-// Collects absolute differences and prints the largest when it goes out of scope, so that limits can be tightened. NaN is larger than
-// everything.
+// Collects absolute differences and prints the largest when it goes out of scope, so that limits
+// can be tightened. NaN is larger than everything.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,9 @@ class LargestError {
  public:
   explicit LargestError(const char* what) : what_(what) {}
   LargestError(const LargestError&) = delete;
-  ~LargestError() { std::printf("largest error, %s: %.3g over %zu values\n", what_, largest_, count_); }
+  ~LargestError() {
+    std::printf("largest error, %s: %.3g over %zu values\n", what_, largest_, count_);
+  }
 
   void add(double actual, double expected) { add(actual - expected); }
   void add(double error) {

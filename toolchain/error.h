@@ -1,4 +1,5 @@
-// Bad input to the toolchain, as an exception: one line naming file, field and reason. toolchain/cli turns it into exit code 1.
+// Bad input to the toolchain, as an exception: one line naming file, field and reason.
+// toolchain/cli turns it into exit code 1.
 #pragma once
 
 #include <stdexcept>

@@ -34,14 +34,17 @@ Json compare_fields(const Json& a, const Json& b) {
 }
 
 // Null if the two are the same to the bit.
-Json compare_tensor(const TensorInfo& a, std::span<const std::byte> a_bytes, const TensorInfo& b, std::span<const std::byte> b_bytes) {
+Json compare_tensor(const TensorInfo& a, std::span<const std::byte> a_bytes, const TensorInfo& b,
+                    std::span<const std::byte> b_bytes) {
   if (a.type != b.type || a.shape != b.shape) {
     return {{"name", a.name},
             {"difference", "shape or type"},
             {"a", {{"type", to_string(a.type)}, {"shape", a.shape}}},
             {"b", {{"type", to_string(b.type)}, {"shape", b.shape}}}};
   }
-  const auto bytes_of = [](const TensorInfo& t, std::span<const std::byte> bytes) { return bytes.subspan(t.offset_bytes, t.size_bytes); };
+  const auto bytes_of = [](const TensorInfo& t, std::span<const std::byte> bytes) {
+    return bytes.subspan(t.offset_bytes, t.size_bytes);
+  };
   if (std::ranges::equal(bytes_of(a, a_bytes), bytes_of(b, b_bytes))) return nullptr;
   const TensorValues left(a, a_bytes), right(b, b_bytes);
   double largest = 0, squares = 0;
@@ -62,8 +65,8 @@ Json compare_tensor(const TensorInfo& a, std::span<const std::byte> a_bytes, con
 
 }  // namespace
 
-Json compare(const Package& a, std::span<const std::byte> a_bytes, const std::string& a_path, const Package& b,
-             std::span<const std::byte> b_bytes, const std::string& b_path) {
+Json compare(const Package& a, std::span<const std::byte> a_bytes, const std::string& a_path,
+             const Package& b, std::span<const std::byte> b_bytes, const std::string& b_path) {
   Json tensors = Json::array();
   const auto find = [](const Package& package, const std::string& name) {
     return std::ranges::find(package.tensors(), name, &TensorInfo::name);
@@ -72,12 +75,14 @@ Json compare(const Package& a, std::span<const std::byte> a_bytes, const std::st
     const auto other = find(b, tensor.name);
     if (other == b.tensors().end()) {
       tensors.push_back({{"name", tensor.name}, {"difference", "only in a"}});
-    } else if (Json difference = compare_tensor(tensor, a_bytes, *other, b_bytes); !difference.is_null()) {
+    } else if (Json difference = compare_tensor(tensor, a_bytes, *other, b_bytes);
+               !difference.is_null()) {
       tensors.push_back(std::move(difference));
     }
   }
   for (const TensorInfo& tensor : b.tensors()) {
-    if (find(a, tensor.name) == a.tensors().end()) tensors.push_back({{"name", tensor.name}, {"difference", "only in b"}});
+    if (find(a, tensor.name) == a.tensors().end())
+      tensors.push_back({{"name", tensor.name}, {"difference", "only in b"}});
   }
   Json fields = compare_fields(flatten_fields(a, a_path), flatten_fields(b, b_path));
   const bool same = a.content_hash() == b.content_hash() && fields.empty() && tensors.empty();

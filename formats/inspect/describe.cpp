@@ -12,7 +12,8 @@ namespace figurine::inspect {
 
 namespace {
 
-// The shortest decimal that is this float, as the double that prints so: 0.05, not 0.05000000074505806.
+// The shortest decimal that is this float, as the double that prints so: 0.05, not
+// 0.05000000074505806.
 double number(float value) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof(text), value).ptr;
@@ -33,12 +34,14 @@ Json describe_conventions() {
           {"axes", "right-handed, y up; cameras OpenCV (x right, y down, z forward)"},
           {"colour_space", "sRGB-encoded as stored, straight alpha"},
           {"rotations", "unit quaternions wxyz, relative to the parent joint"},
-          {"rest_frames", "world-aligned: a joint's rest transform is a translation to its rest position"}};
+          {"rest_frames",
+           "world-aligned: a joint's rest transform is a translation to its rest position"}};
 }
 
 Json describe_provenance(const Provenance& provenance) {
   Json settings = Json::array(), quality = Json::object();
-  for (const KeyValue& setting : provenance.settings) settings.push_back({{"key", setting.key}, {"value", setting.value}});
+  for (const KeyValue& setting : provenance.settings)
+    settings.push_back({{"key", setting.key}, {"value", setting.value}});
   for (const QualityMetric& metric : provenance.quality) quality[metric.name] = metric.value;
   return {{"tool", provenance.tool},
           {"created", provenance.created},
@@ -53,14 +56,20 @@ Json describe_provenance(const Provenance& provenance) {
           {"depicted_person", provenance.depicted_person}};
 }
 
-// Degrees of the left arm below the horizontal at rest: 0 is a T-pose, about 45 an A-pose. Null if the joints have other names.
+// Degrees of the left arm below the horizontal at rest: 0 is a T-pose, about 45 an A-pose. Null if
+// the joints have other names.
 Json left_arm_below_horizontal(const Body& body) {
-  const auto joint = [&](const char* name) { return std::ranges::find(body.joint_names, name) - body.joint_names.begin(); };
-  const auto shoulder = joint("left_shoulder"), wrist = joint("left_wrist"), end = std::ssize(body.joint_names);
+  const auto joint = [&](const char* name) {
+    return std::ranges::find(body.joint_names, name) - body.joint_names.begin();
+  };
+  const auto shoulder = joint("left_shoulder"), wrist = joint("left_wrist"),
+             end = std::ssize(body.joint_names);
   if (shoulder == end || wrist == end) return nullptr;
   double arm[3];
-  for (int k = 0; k < 3; ++k) arm[k] = double(body.joint_position_m[wrist * 3 + k]) - body.joint_position_m[shoulder * 3 + k];
-  const double degrees = std::atan2(-arm[1], std::hypot(arm[0], arm[2])) * 180 / 3.14159265358979323846;
+  for (int k = 0; k < 3; ++k)
+    arm[k] = double(body.joint_position_m[wrist * 3 + k]) - body.joint_position_m[shoulder * 3 + k];
+  const double degrees =
+      std::atan2(-arm[1], std::hypot(arm[0], arm[2])) * 180 / 3.14159265358979323846;
   return std::round(degrees * 10) / 10;
 }
 
@@ -88,10 +97,11 @@ Json describe_body(const Body& body) {
 }
 
 Json describe_motion(const Motion& motion) {
-  return {{"frames", motion.frame_count},
-          {"frames_per_second", number(motion.frames_per_second)},
-          {"seconds", std::round(motion.frame_count / double(motion.frames_per_second) * 1000) / 1000},
-          {"joints", motion.joint_names}};
+  return {
+      {"frames", motion.frame_count},
+      {"frames_per_second", number(motion.frames_per_second)},
+      {"seconds", std::round(motion.frame_count / double(motion.frames_per_second) * 1000) / 1000},
+      {"joints", motion.joint_names}};
 }
 
 std::string layer_name(const Layer& layer) {
@@ -115,7 +125,10 @@ Json describe_network(const Network& network) {
     const Layer& layer = network.layers[i];
     Json inputs = Json::array({layer.inputs[0]});
     if (layer.op == LayerOp::kConcat) inputs.push_back(layer.inputs[1]);
-    layers.push_back({{"op", layer_name(layer)}, {"inputs", inputs}, {"size", shapes[i + 1].size}, {"channels", shapes[i + 1].channels}});
+    layers.push_back({{"op", layer_name(layer)},
+                      {"inputs", inputs},
+                      {"size", shapes[i + 1].size},
+                      {"channels", shapes[i + 1].channels}});
   }
   return {{"input", {{"size", network.input_size}, {"channels", network.input_channels}}},
           {"parameters", count_parameters(network)},
@@ -125,19 +138,20 @@ Json describe_network(const Network& network) {
 
 Json describe_golden(const GoldenFrame& golden) {
   if (golden.rotations.empty()) return nullptr;
-  return {
-      {"joints", golden.rotations.size() / 4},
-      {"root_translation_m", numbers(golden.root_translation_m)},
-      {"width_px", golden.camera.width_px},
-      {"height_px", golden.camera.height_px},
-      {"focal_px", {number(golden.camera.fx_px), number(golden.camera.fy_px)}},
-      {"principal_point_px", {number(golden.camera.cx_px), number(golden.camera.cy_px)}},
-      {"near_m", number(golden.camera.near_m)},
-      {"view_from_world", numbers(golden.camera.view_from_world)},
-      {"background", numbers(golden.background)},
-      {"png_bytes", golden.png.size()},
-      {"fixed_point_hash", golden.fixed_point_hash == std::array<uint64_t, 2>{0, 0} ? Json() : Json(format_hash(golden.fixed_point_hash))},
-      {"fixed_point_library", golden.fixed_point_library}};
+  return {{"joints", golden.rotations.size() / 4},
+          {"root_translation_m", numbers(golden.root_translation_m)},
+          {"width_px", golden.camera.width_px},
+          {"height_px", golden.camera.height_px},
+          {"focal_px", {number(golden.camera.fx_px), number(golden.camera.fy_px)}},
+          {"principal_point_px", {number(golden.camera.cx_px), number(golden.camera.cy_px)}},
+          {"near_m", number(golden.camera.near_m)},
+          {"view_from_world", numbers(golden.camera.view_from_world)},
+          {"background", numbers(golden.background)},
+          {"png_bytes", golden.png.size()},
+          {"fixed_point_hash", golden.fixed_point_hash == std::array<uint64_t, 2>{0, 0}
+                                   ? Json()
+                                   : Json(format_hash(golden.fixed_point_hash))},
+          {"fixed_point_library", golden.fixed_point_library}};
 }
 
 Json describe_precisions(const Avatar& avatar) {
@@ -155,7 +169,9 @@ Json describe_fixed_point(const Avatar& avatar) {
   Json layers = Json::array();
   for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
     const FixedPointConvolution& convolution = fixed.convolutions[i];
-    const uint64_t layer_bytes = convolution.weights.size_bytes() + convolution.weight_scale.size_bytes() + convolution.bias.size_bytes();
+    const uint64_t layer_bytes = convolution.weights.size_bytes() +
+                                 convolution.weight_scale.size_bytes() +
+                                 convolution.bias.size_bytes();
     bytes += layer_bytes;
     Json layer = {{"op", layer_name(avatar.network.layers[i])}, {"bytes", layer_bytes}};
     if (const auto& scales = convolution.weight_scale; !scales.empty()) {
@@ -170,7 +186,9 @@ Json describe_fixed_point(const Avatar& avatar) {
   return {{"bytes", bytes}, {"input_scale", number(fixed.values[0].scale)}, {"layers", layers}};
 }
 
-const char* template_name(TemplateMode mode) { return mode == TemplateMode::kMean ? "mean" : "shaped"; }
+const char* template_name(TemplateMode mode) {
+  return mode == TemplateMode::kMean ? "mean" : "shaped";
+}
 
 Json describe_decoding(const HeadDecoding& decoding) {
   return {{"offset_scale_m", number(decoding.offset_scale_m)},
@@ -202,8 +220,10 @@ Json describe_member(const Package& package, size_t m) {
   const Provenance whole = package.member_provenance(m);
   // What the member has beside the package: behind the package's own entries.
   Provenance own = whole;
-  own.settings.erase(own.settings.begin(), own.settings.begin() + std::ssize(package.provenance().settings));
-  own.sources.erase(own.sources.begin(), own.sources.begin() + std::ssize(package.provenance().sources));
+  own.settings.erase(own.settings.begin(),
+                     own.settings.begin() + std::ssize(package.provenance().settings));
+  own.sources.erase(own.sources.begin(),
+                    own.sources.begin() + std::ssize(package.provenance().sources));
   const size_t coefficients = population.shape.size() / population.size();
   return {{"number", m},
           {"name", member.name},
@@ -257,7 +277,8 @@ Json describe_space(const Sampler& sampler) {
   if (sampler.shape_count > 0) add("shape");
   return {{"values", sampler.mean.size()},
           {"directions", sampler.direction_scale.size()},
-          {"bytes", sampler.mean.size_bytes() + sampler.directions.size_bytes() + sampler.direction_scale.size_bytes()},
+          {"bytes", sampler.mean.size_bytes() + sampler.directions.size_bytes() +
+                        sampler.direction_scale.size_bytes()},
           {"tokens", tokens}};
 }
 
@@ -268,19 +289,23 @@ Json describe_denoiser(const Sampler& sampler) {
           {"heads", sampler.denoiser.heads},
           {"feed_forward", sampler.denoiser.feed_forward},
           {"parameters", sampler.matrices.size() + floats},
-          {"bytes", sampler.matrices.size_bytes() + sampler.row_scale.size_bytes() + floats * sizeof(float)}};
+          {"bytes", sampler.matrices.size_bytes() + sampler.row_scale.size_bytes() +
+                        floats * sizeof(float)}};
 }
 
 Json describe_golden_seeds(const Sampler& sampler) {
   Json list = Json::array();
   for (const GoldenSeed& golden : sampler.golden_seeds) {
-    list.push_back(
-        {{"seed", golden.seed}, {"steps", golden.steps}, {"method", to_string(golden.method)}, {"hash", format_hash(golden.hash)}});
+    list.push_back({{"seed", golden.seed},
+                    {"steps", golden.steps},
+                    {"method", to_string(golden.method)},
+                    {"hash", format_hash(golden.hash)}});
   }
   return list;
 }
 
-// JSON nests without bound, and whoever walks a document does so on the stack: what is deeper than any report needs stays a text.
+// JSON nests without bound, and whoever walks a document does so on the stack: what is deeper than
+// any report needs stays a text.
 Json describe_report(std::string_view report) {
   constexpr int kMaxDepth = 32;
   if (report.empty()) return nullptr;
@@ -326,19 +351,20 @@ Json describe_sampler(const Sampler& sampler) {
 
 Json describe(const Package& package, const std::string& path) {
   const Budget& budget = package.budget();
-  Json document = {
-      {"file", path},
-      {"format", "fgn"},
-      {"version", package.version()},
-      {"kind", to_string(package.kind())},
-      {"name", ""},
-      {"content_hash", format_hash(package.content_hash())},
-      {"size_bytes", package.size_bytes()},
-      {"required_features", package.required_features()},
-      {"optional_features", package.optional_features()},
-      {"budget",
-       {{"peak_memory_bytes", budget.peak_memory_bytes}, {"macs_per_frame", budget.macs_per_frame}, {"gaussians", budget.gaussians}}},
-      {"conventions", describe_conventions()}};
+  Json document = {{"file", path},
+                   {"format", "fgn"},
+                   {"version", package.version()},
+                   {"kind", to_string(package.kind())},
+                   {"name", ""},
+                   {"content_hash", format_hash(package.content_hash())},
+                   {"size_bytes", package.size_bytes()},
+                   {"required_features", package.required_features()},
+                   {"optional_features", package.optional_features()},
+                   {"budget",
+                    {{"peak_memory_bytes", budget.peak_memory_bytes},
+                     {"macs_per_frame", budget.macs_per_frame},
+                     {"gaussians", budget.gaussians}}},
+                   {"conventions", describe_conventions()}};
   switch (package.kind()) {
     case PackageKind::kBody:
       document["name"] = package.body().name;

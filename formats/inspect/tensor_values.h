@@ -19,7 +19,9 @@ double value_at(const std::byte* data, size_t index) {
 class TensorValues {
  public:
   TensorValues(const TensorInfo& tensor, std::span<const std::byte> package)
-      : data_(package.data() + tensor.offset_bytes), type_(tensor.type), count_(tensor.size_bytes / size_bytes(tensor.type)) {}
+      : data_(package.data() + tensor.offset_bytes),
+        type_(tensor.type),
+        count_(tensor.size_bytes / size_bytes(tensor.type)) {}
 
   size_t count() const { return count_; }
   double operator[](size_t index) const {

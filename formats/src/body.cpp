@@ -5,11 +5,15 @@
 
 namespace figurine {
 
-void shape_body(const Body& body, std::span<const float> shape, std::span<float> joint_position_m, std::span<float> texel_position_m) {
-  FIG_CHECK(shape.size() <= body.shape_count(), "more shape coefficients than the body has directions");
-  FIG_CHECK(joint_position_m.size() == body.joint_position_m.size() && texel_position_m.size() == body.texel_position_m.size(),
+void shape_body(const Body& body, std::span<const float> shape, std::span<float> joint_position_m,
+                std::span<float> texel_position_m) {
+  FIG_CHECK(shape.size() <= body.shape_count(),
+            "more shape coefficients than the body has directions");
+  FIG_CHECK(joint_position_m.size() == body.joint_position_m.size() &&
+                texel_position_m.size() == body.texel_position_m.size(),
             "array sizes");
-  const auto add = [&](std::span<const float> mean, std::span<const float> basis, std::span<float> out) {
+  const auto add = [&](std::span<const float> mean, std::span<const float> basis,
+                       std::span<float> out) {
     std::memcpy(out.data(), mean.data(), mean.size_bytes());
     for (size_t s = 0; s < shape.size(); ++s) {
       const float* direction = basis.data() + s * mean.size();
@@ -20,9 +24,10 @@ void shape_body(const Body& body, std::span<const float> shape, std::span<float>
   add(body.texel_position_m, body.texel_shape_basis_m, texel_position_m);
 }
 
-void draw_pose_maps(const Body& body, const PoseView& pose, const MapStatistics& statistics, std::span<Affine> scratch, uint32_t stride,
-                    std::span<float> maps) {
-  FIG_CHECK(stride >= kMapChannels && maps.size() >= size_t(body.uv_size) * body.uv_size * stride, "map size");
+void draw_pose_maps(const Body& body, const PoseView& pose, const MapStatistics& statistics,
+                    std::span<Affine> scratch, uint32_t stride, std::span<float> maps) {
+  FIG_CHECK(stride >= kMapChannels && maps.size() >= size_t(body.uv_size) * body.uv_size * stride,
+            "map size");
   const SkeletonView skeleton = body.mean_skeleton();
   skinning_transforms(skeleton, pose, scratch);
   const std::array<float, 3> root = root_position(skeleton, pose);
@@ -30,10 +35,12 @@ void draw_pose_maps(const Body& body, const PoseView& pose, const MapStatistics&
     for (uint32_t c = 0; c < kMapChannels; ++c) maps[t * stride + c] = 0;
   }
   for (uint32_t i = 0; i < body.texel_count(); ++i) {
-    const Affine transform =
-        blend(scratch, &body.texel_joints[size_t(i) * kSkinInfluences], &body.texel_weights[size_t(i) * kSkinInfluences]);
-    const std::array<float, 3> position = transform_point(transform, &body.texel_position_m[size_t(i) * 3]);
-    const std::array<float, 3> normal = transform_normal(transform, &body.texel_normal[size_t(i) * 3]);
+    const Affine transform = blend(scratch, &body.texel_joints[size_t(i) * kSkinInfluences],
+                                   &body.texel_weights[size_t(i) * kSkinInfluences]);
+    const std::array<float, 3> position =
+        transform_point(transform, &body.texel_position_m[size_t(i) * 3]);
+    const std::array<float, 3> normal =
+        transform_normal(transform, &body.texel_normal[size_t(i) * 3]);
     float* out = &maps[size_t(body.texel[i]) * stride];
     for (int k = 0; k < 3; ++k) {
       out[k] = ((position[k] - root[k]) - statistics.mean[k]) * statistics.scale[k];
@@ -47,15 +54,18 @@ void draw_pose_maps(const Body& body, const PoseView& pose, const MapStatistics&
   }
 }
 
-void draw_fourier_channels(uint32_t uv_size, uint32_t octaves, uint32_t first, uint32_t stride, std::span<float> maps) {
+void draw_fourier_channels(uint32_t uv_size, uint32_t octaves, uint32_t first, uint32_t stride,
+                           std::span<float> maps) {
   if (octaves == 0) return;  // no channel, and maybe no memory to draw it in
-  FIG_CHECK(first + 4 * octaves <= stride && maps.size() >= size_t(uv_size) * uv_size * stride, "map size");
+  FIG_CHECK(first + 4 * octaves <= stride && maps.size() >= size_t(uv_size) * uv_size * stride,
+            "map size");
   constexpr double kPi = 3.14159265358979323846;
   for (uint32_t v = 0; v < uv_size; ++v) {
     for (uint32_t u = 0; u < uv_size; ++u) {
       float* out = &maps[(size_t(v) * uv_size + u) * stride + first];
       for (uint32_t o = 0; o < octaves; ++o) {
-        const double x = kPi * double(1u << o) * (u + 0.5) / uv_size, y = kPi * double(1u << o) * (v + 0.5) / uv_size;
+        const double x = kPi * double(1u << o) * (u + 0.5) / uv_size,
+                     y = kPi * double(1u << o) * (v + 0.5) / uv_size;
         out[4 * o + 0] = static_cast<float>(std::sin(x));
         out[4 * o + 1] = static_cast<float>(std::cos(x));
         out[4 * o + 2] = static_cast<float>(std::sin(y));

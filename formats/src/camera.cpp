@@ -9,7 +9,9 @@ namespace {
 constexpr uint32_t kMaxImageSize = 16384;
 constexpr double kPi = 3.14159265358979323846;
 
-Status invalid(const char* what) { return Status(StatusCode::kInvalidArgument, std::string("camera: ") + what); }
+Status invalid(const char* what) {
+  return Status(StatusCode::kInvalidArgument, std::string("camera: ") + what);
+}
 
 bool is_rotation(const std::array<float, 12>& m) {
   for (int i = 0; i < 3; ++i) {
@@ -28,36 +30,47 @@ bool is_rotation(const std::array<float, 12>& m) {
 }  // namespace
 
 Status validate_camera(const Camera& camera) {
-  if (camera.width_px < 1 || camera.width_px > kMaxImageSize || camera.height_px < 1 || camera.height_px > kMaxImageSize) {
+  if (camera.width_px < 1 || camera.width_px > kMaxImageSize || camera.height_px < 1 ||
+      camera.height_px > kMaxImageSize) {
     return invalid("image size must be between 1 and 16384 pixels a side");
   }
   for (float focal : {camera.fx_px, camera.fy_px}) {
-    if (!(focal > 0) || !std::isfinite(focal)) return invalid("focal lengths must be positive and finite");
+    if (!(focal > 0) || !std::isfinite(focal))
+      return invalid("focal lengths must be positive and finite");
   }
-  if (!std::isfinite(camera.cx_px) || !std::isfinite(camera.cy_px)) return invalid("the principal point must be finite");
+  if (!std::isfinite(camera.cx_px) || !std::isfinite(camera.cy_px))
+    return invalid("the principal point must be finite");
   for (float value : camera.view_from_world) {
     if (!std::isfinite(value)) return invalid("the world-to-camera transform must be finite");
   }
-  if (!is_rotation(camera.view_from_world)) return invalid("the world-to-camera transform must be a rotation and a translation");
-  if (!(camera.near_m > 0) || !std::isfinite(camera.near_m)) return invalid("the near distance must be positive and finite");
+  if (!is_rotation(camera.view_from_world))
+    return invalid("the world-to-camera transform must be a rotation and a translation");
+  if (!(camera.near_m > 0) || !std::isfinite(camera.near_m))
+    return invalid("the near distance must be positive and finite");
   return {};
 }
 
 Result<Camera> make_orbit_camera(const OrbitCamera& orbit, uint32_t width_px, uint32_t height_px) {
   if (!std::isfinite(orbit.azimuth_deg)) return invalid("orbit azimuth must be finite");
-  if (!(std::abs(orbit.elevation_deg) <= 89)) return invalid("orbit elevation must be within -89 and 89 degrees");
-  if (!(orbit.distance_m > 0) || !std::isfinite(orbit.distance_m)) return invalid("orbit distance must be positive and finite");
+  if (!(std::abs(orbit.elevation_deg) <= 89))
+    return invalid("orbit elevation must be within -89 and 89 degrees");
+  if (!(orbit.distance_m > 0) || !std::isfinite(orbit.distance_m))
+    return invalid("orbit distance must be positive and finite");
   if (!(orbit.vertical_fov_deg >= 1 && orbit.vertical_fov_deg <= 170))
     return invalid("orbit field of view must be within 1 and 170 degrees");
   const double azimuth = orbit.azimuth_deg * kPi / 180, elevation = orbit.elevation_deg * kPi / 180;
-  // Unit vector from target to camera; forward is its opposite. right = forward x up; down completes the OpenCV frame.
-  const double from_target[3] = {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
+  // Unit vector from target to camera; forward is its opposite. right = forward x up; down
+  // completes the OpenCV frame.
+  const double from_target[3] = {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
+                                 std::cos(azimuth) * std::cos(elevation)};
   const double forward[3] = {-from_target[0], -from_target[1], -from_target[2]};
   const double right[3] = {std::cos(azimuth), 0, -std::sin(azimuth)};
-  const double down[3] = {forward[1] * right[2] - forward[2] * right[1], forward[2] * right[0] - forward[0] * right[2],
+  const double down[3] = {forward[1] * right[2] - forward[2] * right[1],
+                          forward[2] * right[0] - forward[0] * right[2],
                           forward[0] * right[1] - forward[1] * right[0]};
   Camera camera{.width_px = width_px, .height_px = height_px};
-  camera.fy_px = static_cast<float>(0.5 * height_px / std::tan(0.5 * orbit.vertical_fov_deg * kPi / 180));
+  camera.fy_px =
+      static_cast<float>(0.5 * height_px / std::tan(0.5 * orbit.vertical_fov_deg * kPi / 180));
   camera.fx_px = camera.fy_px;
   camera.cx_px = 0.5f * width_px;
   camera.cy_px = 0.5f * height_px;

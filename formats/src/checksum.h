@@ -10,7 +10,8 @@
 namespace figurine {
 
 uint64_t xxh3_64(std::span<const std::byte> bytes);
-std::array<uint64_t, 2> xxh3_128(std::span<const std::byte> bytes);                   // low, high
-std::array<uint64_t, 2> xxh3_128(std::span<const std::span<const std::byte>> parts);  // of all of them, one after the other
+std::array<uint64_t, 2> xxh3_128(std::span<const std::byte> bytes);  // low, high
+std::array<uint64_t, 2> xxh3_128(
+    std::span<const std::span<const std::byte>> parts);  // of all of them, one after the other
 
 }  // namespace figurine

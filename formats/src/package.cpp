@@ -44,7 +44,9 @@ const char* to_string(DataType type) {
   return "unknown";
 }
 
-const char* to_string(Precision precision) { return precision == Precision::kFixedPoint ? "q8" : "f32"; }
+const char* to_string(Precision precision) {
+  return precision == Precision::kFixedPoint ? "q8" : "f32";
+}
 
 size_t size_bytes(DataType type) {
   switch (type) {
@@ -78,13 +80,14 @@ Package::~Package() = default;
 
 namespace {
 
-// The header promises what the content holds, so that a reader of the header alone can tell. avatar: null for other kinds.
+// The header promises what the content holds, so that a reader of the header alone can tell.
+// avatar: null for other kinds.
 Status check_features(const layout::Header& header, const Avatar* avatar) {
   const bool promised = (header.required_features & kFeatureFixedPoint) != 0;
   const bool held = avatar != nullptr && avatar->holds(Precision::kFixedPoint);
   if (promised == held) return {};
-  return corrupt("header.required_features", "the bit of fixed point is ", promised ? "" : "not ", "set, such a network is ",
-                 held ? "" : "not ", "there");
+  return corrupt("header.required_features", "the bit of fixed point is ", promised ? "" : "not ",
+                 "set, such a network is ", held ? "" : "not ", "there");
 }
 
 }  // namespace
@@ -109,16 +112,19 @@ Result<Package> Package::open(std::span<const std::byte> bytes, const std::strin
         FIG_RETURN_IF_ERROR(read_body(index, blobs, contents->content.emplace<Body>()));
         break;
       case PackageKind::kAvatar:
-        FIG_RETURN_IF_ERROR(read_avatar(index, blobs, contents->budget, contents->content.emplace<Avatar>()));
+        FIG_RETURN_IF_ERROR(
+            read_avatar(index, blobs, contents->budget, contents->content.emplace<Avatar>()));
         break;
       case PackageKind::kMotion:
         FIG_RETURN_IF_ERROR(read_motion(index, blobs, contents->content.emplace<Motion>()));
         break;
       case PackageKind::kPopulation:
-        FIG_RETURN_IF_ERROR(read_population(index, blobs, contents->budget, contents->content.emplace<PopulationContent>()));
+        FIG_RETURN_IF_ERROR(read_population(index, blobs, contents->budget,
+                                            contents->content.emplace<PopulationContent>()));
         break;
       case PackageKind::kSampler:
-        FIG_RETURN_IF_ERROR(read_sampler(index, blobs, contents->budget, contents->content.emplace<Sampler>()));
+        FIG_RETURN_IF_ERROR(
+            read_sampler(index, blobs, contents->budget, contents->content.emplace<Sampler>()));
         break;
     }
     FIG_RETURN_IF_ERROR(check_features(contents->header, std::get_if<Avatar>(&contents->content)));
@@ -177,7 +183,8 @@ Provenance Package::member_provenance(size_t member) const {
   merged.sources.insert(merged.sources.end(), own.sources.begin(), own.sources.end());
   merged.quality.clear();
   for (size_t k = 0; k < all.members[member].quality.size(); ++k) {
-    if (!std::isnan(all.members[member].quality[k])) merged.quality.push_back({all.quality_names[k], all.members[member].quality[k]});
+    if (!std::isnan(all.members[member].quality[k]))
+      merged.quality.push_back({all.quality_names[k], all.members[member].quality[k]});
   }
   return merged;
 }
@@ -190,13 +197,16 @@ std::string format_hash(const std::array<uint64_t, 2>& hash) {
   return digits;
 }
 
-std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8) { return xxh3_128(std::as_bytes(rgba8)); }
+std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8) {
+  return xxh3_128(std::as_bytes(rgba8));
+}
 
 std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape) {
   std::vector<std::span<const std::byte>> parts;
   for (const FixedPointConvolution& convolution : fixed.convolutions) {
     for (const std::span<const std::byte> part :
-         {std::as_bytes(convolution.weights), std::as_bytes(convolution.weight_scale), std::as_bytes(convolution.bias)}) {
+         {std::as_bytes(convolution.weights), std::as_bytes(convolution.weight_scale),
+          std::as_bytes(convolution.bias)}) {
       parts.push_back(part);
     }
   }
@@ -206,22 +216,28 @@ std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<c
 
 Status check_avatar_fits_body(const Avatar& avatar, const Package& package) {
   const auto mismatch = [&](std::initializer_list<Word> why) {
-    return refuse(StatusCode::kMismatch, concatenate({"avatar '", avatar.name, "' does not fit the body"}), why);
+    return refuse(StatusCode::kMismatch,
+                  concatenate({"avatar '", avatar.name, "' does not fit the body"}), why);
   };
-  if (package.kind() != PackageKind::kBody) return mismatch({"the other package is of kind ", to_string(package.kind())});
+  if (package.kind() != PackageKind::kBody)
+    return mismatch({"the other package is of kind ", to_string(package.kind())});
   const Body& body = package.body();
   if (avatar.body_hash != package.content_hash()) {
-    return mismatch({"made for '", avatar.body_name, "' ", format_hash(avatar.body_hash), ", this is '", body.name, "' ",
-                     format_hash(package.content_hash())});
+    return mismatch({"made for '", avatar.body_name, "' ", format_hash(avatar.body_hash),
+                     ", this is '", body.name, "' ", format_hash(package.content_hash())});
   }
   if (avatar.network.input_size != body.uv_size) {
-    return mismatch({"its map has ", avatar.network.input_size, " texels a side, the body's ", body.uv_size});
+    return mismatch(
+        {"its map has ", avatar.network.input_size, " texels a side, the body's ", body.uv_size});
   }
   if (avatar.shape.size() > body.shape_count()) {
-    return mismatch({"it has ", avatar.shape.size(), " shape coefficients, the body ", body.shape_count()});
+    return mismatch(
+        {"it has ", avatar.shape.size(), " shape coefficients, the body ", body.shape_count()});
   }
-  if (!avatar.golden.rotations.empty() && avatar.golden.rotations.size() != size_t{body.joint_count()} * 4) {
-    return mismatch({"its golden pose has ", avatar.golden.rotations.size() / 4, " joints, the body ", body.joint_count()});
+  if (!avatar.golden.rotations.empty() &&
+      avatar.golden.rotations.size() != size_t{body.joint_count()} * 4) {
+    return mismatch({"its golden pose has ", avatar.golden.rotations.size() / 4,
+                     " joints, the body ", body.joint_count()});
   }
   for (uint8_t joint : avatar.pose_statistics.joints) {
     if (joint >= body.joint_count()) return mismatch({"its pose statistics name joint ", joint});
@@ -231,14 +247,18 @@ Status check_avatar_fits_body(const Avatar& avatar, const Package& package) {
 
 Status check_motion_fits_body(const Motion& motion, const Body& body) {
   const auto mismatch = [&](std::initializer_list<Word> why) {
-    return refuse(StatusCode::kMismatch, concatenate({"motion '", motion.name, "' does not fit the body '", body.name, "'"}), why);
+    return refuse(
+        StatusCode::kMismatch,
+        concatenate({"motion '", motion.name, "' does not fit the body '", body.name, "'"}), why);
   };
   if (motion.joint_names.size() != body.joint_names.size()) {
-    return mismatch({"it has ", motion.joint_names.size(), " joints, the body ", body.joint_names.size()});
+    return mismatch(
+        {"it has ", motion.joint_names.size(), " joints, the body ", body.joint_names.size()});
   }
   for (size_t j = 0; j < body.joint_names.size(); ++j) {
     if (motion.joint_names[j] == body.joint_names[j]) continue;
-    return mismatch({"its joint ", j, " is '", motion.joint_names[j], "', the body's '", body.joint_names[j], "'"});
+    return mismatch({"its joint ", j, " is '", motion.joint_names[j], "', the body's '",
+                     body.joint_names[j], "'"});
   }
   return {};
 }

@@ -1,5 +1,6 @@
-// The meaning of an avatar package: a network whose shapes fit its weights and its head, parameters that decode to sound Gaussians, a pose
-// distribution that can be inverted, a golden frame that can be drawn.
+// The meaning of an avatar package: a network whose shapes fit its weights and its head, parameters
+// that decode to sound Gaussians, a pose distribution that can be inverted, a golden frame that can
+// be drawn.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -10,13 +11,16 @@
 
 namespace figurine {
 
-Status read_map_statistics(const schema::MapStatistics& table, std::string_view owner, MapStatistics& out) {
+Status read_map_statistics(const schema::MapStatistics& table, std::string_view owner,
+                           MapStatistics& out) {
   const std::string field = concatenate({owner, ".map_statistics"});
   for (uint32_t c = 0; c < kMapChannels; ++c) {
     out.mean[c] = table.mean()->Get(c);
     out.scale[c] = table.scale()->Get(c);
-    if (!(std::fabs(out.mean[c]) <= layout::kMaxLengthM)) return corrupt(field, "channel ", c, ": the mean is not finite or too large");
-    if (!(out.scale[c] > 0 && out.scale[c] <= 1e6f)) return corrupt(field, "channel ", c, ": the scale is not positive, or too large");
+    if (!(std::fabs(out.mean[c]) <= layout::kMaxLengthM))
+      return corrupt(field, "channel ", c, ": the mean is not finite or too large");
+    if (!(out.scale[c] > 0 && out.scale[c] <= 1e6f))
+      return corrupt(field, "channel ", c, ": the scale is not positive, or too large");
   }
   return {};
 }
@@ -29,10 +33,14 @@ Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, 
          .sh_degree = table.sh_degree()};
   const auto within = [](float value, float max) { return value > 0 && value <= max; };
   const std::string field = concatenate({owner, ".decoding."});
-  if (!within(out.offset_scale_m, 10)) return corrupt(field + "offset_scale_m", "is not above 0 and at most 10");
-  if (!within(out.spacing_scale, 100)) return corrupt(field + "spacing_scale", "is not above 0 and at most 100");
-  if (!within(out.max_log_scale, 20)) return corrupt(field + "max_log_scale", "is not above 0 and at most 20");
-  if (!(std::fabs(out.opacity_bias) <= 100)) return corrupt(field + "opacity_bias", "is not within -100 and 100");
+  if (!within(out.offset_scale_m, 10))
+    return corrupt(field + "offset_scale_m", "is not above 0 and at most 10");
+  if (!within(out.spacing_scale, 100))
+    return corrupt(field + "spacing_scale", "is not above 0 and at most 100");
+  if (!within(out.max_log_scale, 20))
+    return corrupt(field + "max_log_scale", "is not above 0 and at most 20");
+  if (!(std::fabs(out.opacity_bias) <= 100))
+    return corrupt(field + "opacity_bias", "is not within -100 and 100");
   if (out.sh_degree > kMaxShDegree) return corrupt(field + "sh_degree", "is above ", kMaxShDegree);
   return {};
 }
@@ -41,7 +49,8 @@ Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, 
 Status read_layers(const schema::Network& table, Network& out) {
   out.input_size = table.input_size();
   out.input_channels = table.input_channels();
-  if (table.layers()->size() > kMaxLayers) return over_limit("network", "more than ", kMaxLayers, " layers");
+  if (table.layers()->size() > kMaxLayers)
+    return over_limit("network", "more than ", kMaxLayers, " layers");
   for (const schema::Layer* entry : *table.layers()) {
     out.layers.push_back({.op = static_cast<LayerOp>(entry->op()),
                           .inputs = {entry->input_a(), entry->input_b()},
@@ -52,18 +61,22 @@ Status read_layers(const schema::Network& table, Network& out) {
   return infer_shapes(out, false).status();
 }
 
-Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader::Presence presence, Network& out) {
+Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader::Presence presence,
+                         Network& out) {
   const std::vector<ValueShape> shapes = *infer_shapes(out, false);
   for (size_t i = 0; i < out.layers.size(); ++i) {
     Layer& layer = out.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
     const std::string name = concatenate({prefix, ".", i});
     const uint32_t in_channels = shapes[layer.inputs[0]].channels;
-    FIG_RETURN_IF_ERROR(
-        blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, layer.weights, presence));
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".weights",
+                                   {layer.out_channels, layer.kernel, layer.kernel, in_channels},
+                                   layer.weights, presence));
     FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, layer.bias, presence));
-    FIG_RETURN_IF_ERROR(check_magnitude(layer.weights, name + ".weights", std::numeric_limits<float>::max()));
-    FIG_RETURN_IF_ERROR(check_magnitude(layer.bias, name + ".bias", std::numeric_limits<float>::max()));
+    FIG_RETURN_IF_ERROR(
+        check_magnitude(layer.weights, name + ".weights", std::numeric_limits<float>::max()));
+    FIG_RETURN_IF_ERROR(
+        check_magnitude(layer.bias, name + ".bias", std::numeric_limits<float>::max()));
   }
   return {};
 }
@@ -72,26 +85,32 @@ namespace {
 
 // A convolution without float weights is allowed only where none has any.
 Status check_all_or_none(const Network& network) {
-  const auto holds = [](const Layer& layer) { return !layer.weights.empty() || !layer.bias.empty(); };
+  const auto holds = [](const Layer& layer) {
+    return !layer.weights.empty() || !layer.bias.empty();
+  };
   if (std::none_of(network.layers.begin(), network.layers.end(), holds)) return {};
   for (size_t i = 0; i < network.layers.size(); ++i) {
     const Layer& layer = network.layers[i];
     if (layer.op != LayerOp::kConv2d || (!layer.weights.empty() && !layer.bias.empty())) continue;
-    return corrupt(concatenate({"network.", i, layer.weights.empty() ? ".weights" : ".bias"}), "is missing, while others are there");
+    return corrupt(concatenate({"network.", i, layer.weights.empty() ? ".weights" : ".bias"}),
+                   "is missing, while others are there");
   }
   return {};
 }
 
 // All of them, or none if the network is there in fixed point.
 Status read_float_weights(BlobReader& blobs, bool has_fixed_point, Network& out) {
-  FIG_RETURN_IF_ERROR(read_convolutions(blobs, "network", has_fixed_point ? BlobReader::kMayBeAbsent : BlobReader::kRequired, out));
+  FIG_RETURN_IF_ERROR(read_convolutions(
+      blobs, "network", has_fixed_point ? BlobReader::kMayBeAbsent : BlobReader::kRequired, out));
   return has_fixed_point ? check_all_or_none(out) : Status();
 }
 
-Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, const Network& network, FixedPointNetwork& out) {
+Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, const Network& network,
+                        FixedPointNetwork& out) {
   const std::vector<ValueShape> shapes = *infer_shapes(network, false);
   for (const schema::Quantisation* entry : *table.values()) {
-    if (out.values.size() == kMaxLayers) return over_limit("avatar.fixed_point", "more than ", kMaxLayers, " values");
+    if (out.values.size() == kMaxLayers)
+      return over_limit("avatar.fixed_point", "more than ", kMaxLayers, " values");
     out.values.push_back({.scale = entry->scale(), .zero_point = entry->zero_point()});
   }
   out.convolutions.resize(network.layers.size());
@@ -101,8 +120,11 @@ Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, cons
     FixedPointConvolution& convolution = out.convolutions[i];
     const std::string name = concatenate({"fixed.", i});
     const uint32_t in_channels = shapes[layer.inputs[0]].channels;
-    FIG_RETURN_IF_ERROR(blobs.read(name + ".weights", {layer.out_channels, layer.kernel, layer.kernel, in_channels}, convolution.weights));
-    FIG_RETURN_IF_ERROR(blobs.read(name + ".scale", {layer.out_channels}, convolution.weight_scale));
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".weights",
+                                   {layer.out_channels, layer.kernel, layer.kernel, in_channels},
+                                   convolution.weights));
+    FIG_RETURN_IF_ERROR(
+        blobs.read(name + ".scale", {layer.out_channels}, convolution.weight_scale));
     FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, convolution.bias));
   }
   return validate_fixed_point(network, out);
@@ -113,7 +135,9 @@ Status read_network(const schema::Avatar& table, BlobReader& blobs, Avatar& out)
   const bool has_fixed_point = table.fixed_point() != nullptr;
   FIG_RETURN_IF_ERROR(read_layers(*table.network(), out.network));
   FIG_RETURN_IF_ERROR(read_float_weights(blobs, has_fixed_point, out.network));
-  return has_fixed_point ? read_fixed_point(*table.fixed_point(), blobs, out.network, out.fixed_point) : Status();
+  return has_fixed_point
+             ? read_fixed_point(*table.fixed_point(), blobs, out.network, out.fixed_point)
+             : Status();
 }
 
 }  // namespace
@@ -124,25 +148,36 @@ Status check_network_fits(const Avatar& avatar, std::string_view owner, const Bu
     return over_limit("network.input_size", "is larger than ", kMaxUvSize);
   }
   if (avatar.fourier_octaves > layout::kMaxFourierOctaves) {
-    return over_limit(concatenate({owner, ".fourier_octaves"}), "is above ", layout::kMaxFourierOctaves);
+    return over_limit(concatenate({owner, ".fourier_octaves"}), "is above ",
+                      layout::kMaxFourierOctaves);
   }
-  if (const uint32_t channels = kMapChannels + 4 * avatar.fourier_octaves; avatar.network.input_channels != channels) {
-    return corrupt("network.input_channels", "is ", avatar.network.input_channels, ", maps and Fourier channels make ", channels);
+  if (const uint32_t channels = kMapChannels + 4 * avatar.fourier_octaves;
+      avatar.network.input_channels != channels) {
+    return corrupt("network.input_channels", "is ", avatar.network.input_channels,
+                   ", maps and Fourier channels make ", channels);
   }
-  if (shapes.back().size != avatar.network.input_size) return corrupt("network", "the result does not have the size of the input");
-  if (const uint32_t channels = head_channels(avatar.decoding.sh_degree); shapes.back().channels != channels) {
-    return corrupt("network", "the result has ", shapes.back().channels, " channels, the head needs ", channels);
+  if (shapes.back().size != avatar.network.input_size)
+    return corrupt("network", "the result does not have the size of the input");
+  if (const uint32_t channels = head_channels(avatar.decoding.sh_degree);
+      shapes.back().channels != channels) {
+    return corrupt("network", "the result has ", shapes.back().channels,
+                   " channels, the head needs ", channels);
   }
   uint64_t largest_value = 0;
   for (const ValueShape& shape : shapes) {
-    largest_value = std::max(largest_value, uint64_t{shape.size} * shape.size * shape.channels * sizeof(float));
+    largest_value =
+        std::max(largest_value, uint64_t{shape.size} * shape.size * shape.channels * sizeof(float));
   }
-  if (largest_value > layout::kMaxValueBytes) return over_limit("network", "an activation is larger than 1 GiB");
+  if (largest_value > layout::kMaxValueBytes)
+    return over_limit("network", "an activation is larger than 1 GiB");
   if (budget.peak_memory_bytes != 0 && largest_value > budget.peak_memory_bytes) {
-    return over_limit("budget.peak_memory_bytes", "declares ", budget.peak_memory_bytes, ", one activation alone needs ", largest_value);
+    return over_limit("budget.peak_memory_bytes", "declares ", budget.peak_memory_bytes,
+                      ", one activation alone needs ", largest_value);
   }
-  if (const uint64_t macs = count_macs(avatar.network, shapes); budget.macs_per_frame != 0 && macs > budget.macs_per_frame) {
-    return over_limit("budget.macs_per_frame", "declares ", budget.macs_per_frame, ", the network needs ", macs);
+  if (const uint64_t macs = count_macs(avatar.network, shapes);
+      budget.macs_per_frame != 0 && macs > budget.macs_per_frame) {
+    return over_limit("budget.macs_per_frame", "declares ", budget.macs_per_frame,
+                      ", the network needs ", macs);
   }
   if (budget.gaussians > uint64_t{avatar.network.input_size} * avatar.network.input_size) {
     return corrupt("budget.gaussians", "is more than the map has texels");
@@ -168,18 +203,23 @@ bool is_positive_definite(std::span<const float> matrix, size_t n) {
 
 }  // namespace
 
-Status read_statistics_joints(const flatbuffers::Vector<uint8_t>& list, const std::string& field, std::vector<uint8_t>& out) {
-  if (list.size() < 1 || list.size() > kMaxJoints) return corrupt(field, "does not list 1 to 255 joints");
+Status read_statistics_joints(const flatbuffers::Vector<uint8_t>& list, const std::string& field,
+                              std::vector<uint8_t>& out) {
+  if (list.size() < 1 || list.size() > kMaxJoints)
+    return corrupt(field, "does not list 1 to 255 joints");
   out.assign(list.begin(), list.end());
   std::vector<uint8_t> sorted = out;
   std::sort(sorted.begin(), sorted.end());
-  return std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end() ? Status() : corrupt(field, "lists a joint twice");
+  return std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end()
+             ? Status()
+             : corrupt(field, "lists a joint twice");
 }
 
 Status check_covariance(std::span<const float> covariance, size_t n, const std::string& field) {
   FIG_RETURN_IF_ERROR(check_magnitude(covariance, field, 1e4f));
   for (size_t i = 0; i < n; ++i) {
-    if (!(covariance[i * n + i] > 0)) return corrupt(field, "row ", i, ": the variance is not positive");
+    if (!(covariance[i * n + i] > 0))
+      return corrupt(field, "row ", i, ": the variance is not positive");
     for (size_t j = 0; j < i; ++j) {
       const float a = covariance[i * n + j], b = covariance[j * n + i];
       if (std::fabs(a - b) > 1e-6f * std::max(std::fabs(a), std::fabs(b))) {
@@ -187,11 +227,14 @@ Status check_covariance(std::span<const float> covariance, size_t n, const std::
       }
     }
   }
-  return is_positive_definite(covariance, n) ? Status() : corrupt(field, "is not positive definite");
+  return is_positive_definite(covariance, n) ? Status()
+                                             : corrupt(field, "is not positive definite");
 }
 
-Status read_pose_statistics(const schema::PoseStatistics& table, std::string_view owner, BlobReader& blobs, PoseStatistics& out) {
-  FIG_RETURN_IF_ERROR(read_statistics_joints(*table.joints(), concatenate({owner, ".pose_statistics.joints"}), out.joints));
+Status read_pose_statistics(const schema::PoseStatistics& table, std::string_view owner,
+                            BlobReader& blobs, PoseStatistics& out) {
+  FIG_RETURN_IF_ERROR(read_statistics_joints(
+      *table.joints(), concatenate({owner, ".pose_statistics.joints"}), out.joints));
   const uint32_t n = static_cast<uint32_t>(out.joints.size()) * 3;
   FIG_RETURN_IF_ERROR(blobs.read("pose.mean", {n}, out.mean));
   FIG_RETURN_IF_ERROR(blobs.read("pose.covariance", {n, n}, out.covariance));
@@ -203,10 +246,13 @@ namespace {
 
 // The image's size stands in the first chunk of every PNG.
 Status check_png(std::span<const uint8_t> png, const Camera& camera) {
-  constexpr uint8_t kStart[16] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
-  if (png.size() < 33 || std::memcmp(png.data(), kStart, sizeof(kStart)) != 0) return corrupt("golden.png", "is not a PNG file");
+  constexpr uint8_t kStart[16] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n',
+                                  0,    0,   0,   13,  'I',  'H',  'D',  'R'};
+  if (png.size() < 33 || std::memcmp(png.data(), kStart, sizeof(kStart)) != 0)
+    return corrupt("golden.png", "is not a PNG file");
   const auto big_endian = [&](size_t i) {
-    return uint32_t{png[i]} << 24 | uint32_t{png[i + 1]} << 16 | uint32_t{png[i + 2]} << 8 | uint32_t{png[i + 3]};
+    return uint32_t{png[i]} << 24 | uint32_t{png[i + 1]} << 16 | uint32_t{png[i + 2]} << 8 |
+           uint32_t{png[i + 3]};
   };
   if (big_endian(16) != camera.width_px || big_endian(20) != camera.height_px)
     return corrupt("golden.png", "does not have the golden camera's size");
@@ -227,10 +273,13 @@ Status read_golden_view(const schema::GoldenFrame& table, GoldenFrame& out) {
                 .cx_px = camera.cx_px(),
                 .cy_px = camera.cy_px(),
                 .near_m = camera.near_m()};
-  for (uint32_t i = 0; i < 12; ++i) out.camera.view_from_world[i] = camera.view_from_world()->Get(i);
-  if (const Status status = validate_camera(out.camera); !status.ok()) return corrupt("golden", status.message());
+  for (uint32_t i = 0; i < 12; ++i)
+    out.camera.view_from_world[i] = camera.view_from_world()->Get(i);
+  if (const Status status = validate_camera(out.camera); !status.ok())
+    return corrupt("golden", status.message());
   for (float channel : out.background) {
-    if (!(channel >= 0 && channel <= 1)) return corrupt("golden.background", "is not within 0 and 1");
+    if (!(channel >= 0 && channel <= 1))
+      return corrupt("golden.background", "is not within 0 and 1");
   }
   return {};
 }
@@ -238,7 +287,8 @@ Status read_golden_view(const schema::GoldenFrame& table, GoldenFrame& out) {
 Status check_golden_pose(const GoldenFrame& golden) {
   const size_t joints = golden.rotations.size() / 4;
   if (joints > kMaxJoints) return corrupt("golden.rotations", "has more than 255 joints");
-  const Status status = validate_pose({golden.root_translation_m, golden.rotations}, static_cast<uint32_t>(joints));
+  const Status status =
+      validate_pose({golden.root_translation_m, golden.rotations}, static_cast<uint32_t>(joints));
   return status.ok() ? Status() : corrupt("golden", status.message());
 }
 
@@ -248,22 +298,28 @@ Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFr
   FIG_RETURN_IF_ERROR(check_golden_pose(out));
   out.fixed_point_hash = {table.fixed_point_hash_low(), table.fixed_point_hash_high()};
   if (table.fixed_point_library() != nullptr) {
-    FIG_RETURN_IF_ERROR(
-        read_text(table.fixed_point_library(), "golden.fixed_point_library", layout::kMaxNameBytes, out.fixed_point_library));
+    FIG_RETURN_IF_ERROR(read_text(table.fixed_point_library(), "golden.fixed_point_library",
+                                  layout::kMaxNameBytes, out.fixed_point_library));
   }
-  FIG_RETURN_IF_ERROR(blobs.read("golden.png", {BlobReader::kAny}, out.png, BlobReader::kMayBeAbsent));
+  FIG_RETURN_IF_ERROR(
+      blobs.read("golden.png", {BlobReader::kAny}, out.png, BlobReader::kMayBeAbsent));
   return out.png.empty() ? Status() : check_png(out.png, out.camera);
 }
 
-Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& budget, Avatar& out) {
+Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& budget,
+                   Avatar& out) {
   const schema::Avatar& table = *index.content_as_Avatar();
   FIG_RETURN_IF_ERROR(read_text(index.name(), "avatar.name", layout::kMaxNameBytes, out.name));
-  FIG_RETURN_IF_ERROR(read_text(table.body_name(), "avatar.body_name", layout::kMaxNameBytes, out.body_name));
-  FIG_RETURN_IF_ERROR(read_text(table.preset(), "avatar.preset", layout::kMaxNameBytes, out.preset));
+  FIG_RETURN_IF_ERROR(
+      read_text(table.body_name(), "avatar.body_name", layout::kMaxNameBytes, out.body_name));
+  FIG_RETURN_IF_ERROR(
+      read_text(table.preset(), "avatar.preset", layout::kMaxNameBytes, out.preset));
   out.body_hash = {table.body_hash_low(), table.body_hash_high()};
-  if (table.template_mode() > schema::TemplateMode::MAX) return unsupported("avatar.template_mode", "is unknown");
+  if (table.template_mode() > schema::TemplateMode::MAX)
+    return unsupported("avatar.template_mode", "is unknown");
   out.template_mode = static_cast<TemplateMode>(table.template_mode());
-  FIG_RETURN_IF_ERROR(blobs.read("avatar.shape", {BlobReader::kAny}, out.shape, BlobReader::kMayBeAbsent));
+  FIG_RETURN_IF_ERROR(
+      blobs.read("avatar.shape", {BlobReader::kAny}, out.shape, BlobReader::kMayBeAbsent));
   if (out.shape.size() > kMaxShapeCoefficients) {
     return over_limit("avatar.shape", "has more than ", kMaxShapeCoefficients, " coefficients");
   }
@@ -274,9 +330,11 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
   FIG_RETURN_IF_ERROR(read_network(table, blobs, out));
   FIG_RETURN_IF_ERROR(check_network_fits(out, "avatar", budget));
   if (table.pose_statistics() != nullptr) {
-    FIG_RETURN_IF_ERROR(read_pose_statistics(*table.pose_statistics(), "avatar", blobs, out.pose_statistics));
+    FIG_RETURN_IF_ERROR(
+        read_pose_statistics(*table.pose_statistics(), "avatar", blobs, out.pose_statistics));
   }
-  if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden(*table.golden(), blobs, out.golden));
+  if (table.golden() != nullptr)
+    FIG_RETURN_IF_ERROR(read_golden(*table.golden(), blobs, out.golden));
   if (out.fixed_point.empty() && out.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
     return corrupt("golden.fixed_point_hash", "is there, a network in fixed point is not");
   }

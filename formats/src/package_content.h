@@ -1,5 +1,6 @@
-// What a package's numbers mean: turns an opened container into a Body, an Avatar, a Motion, a Population or a Sampler whose spans point
-// into the package's bytes, or says in one line which field cannot be true. Nothing here writes, repairs or guesses.
+// What a package's numbers mean: turns an opened container into a Body, an Avatar, a Motion, a
+// Population or a Sampler whose spans point into the package's bytes, or says in one line which
+// field cannot be true. Nothing here writes, repairs or guesses.
 #pragma once
 
 #include <cstdint>
@@ -14,41 +15,52 @@ namespace figurine {
 Status read_conventions(const schema::Conventions& conventions);
 Status read_provenance(const schema::Provenance& table, Provenance& out);
 Status read_body(const schema::Index& index, BlobReader& blobs, Body& out);
-Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& budget, Avatar& out);
+Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& budget,
+                   Avatar& out);
 Status read_motion(const schema::Index& index, BlobReader& blobs, Motion& out);
 
 struct PopulationContent {
   Population population;
-  std::vector<Provenance> own;  // [M] what a member's provenance has beside the package's; quality is in the population
+  std::vector<Provenance>
+      own;  // [M] what a member's provenance has beside the package's; quality is in the population
 };
-Status read_population(const schema::Index& index, BlobReader& blobs, const Budget& budget, PopulationContent& out);
-Status read_sampler(const schema::Index& index, BlobReader& blobs, const Budget& budget, Sampler& out);
+Status read_population(const schema::Index& index, BlobReader& blobs, const Budget& budget,
+                       PopulationContent& out);
+Status read_sampler(const schema::Index& index, BlobReader& blobs, const Budget& budget,
+                    Sampler& out);
 
 // Shared checks.
-Status read_text(const flatbuffers::String* text, const std::string& field, uint32_t max_bytes, std::string& out, bool allow_lines = false);
+Status read_text(const flatbuffers::String* text, const std::string& field, uint32_t max_bytes,
+                 std::string& out, bool allow_lines = false);
 // 1 to kMaxJoints names, none empty, none twice.
-Status read_joint_names(const flatbuffers::Vector<flatbuffers::Offset<flatbuffers::String>>& list, const std::string& field,
-                        std::vector<std::string>& out);
+Status read_joint_names(const flatbuffers::Vector<flatbuffers::Offset<flatbuffers::String>>& list,
+                        const std::string& field, std::vector<std::string>& out);
 // All finite and of magnitude at most max.
 Status check_magnitude(std::span<const float> values, const std::string& field, float max);
 
-// Parts of an avatar that a population's members and a sampler's avatars have too. owner: "avatar", "sampler"; what messages call it.
-Status read_map_statistics(const schema::MapStatistics& table, std::string_view owner, MapStatistics& out);
+// Parts of an avatar that a population's members and a sampler's avatars have too. owner: "avatar",
+// "sampler"; what messages call it.
+Status read_map_statistics(const schema::MapStatistics& table, std::string_view owner,
+                           MapStatistics& out);
 Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, HeadDecoding& out);
 // Layers and input, no weights; the shapes fit each other.
 Status read_layers(const schema::Network& table, Network& out);
 // "prefix.i.weights" and "prefix.i.bias" of every convolution, finite.
-Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader::Presence presence, Network& out);
+Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader::Presence presence,
+                         Network& out);
 // The network against maps, head and budget; the avatar's weights are not looked at.
 Status check_network_fits(const Avatar& avatar, std::string_view owner, const Budget& budget);
 // The listed joints of pose statistics: 1 to 255, none twice.
-Status read_statistics_joints(const flatbuffers::Vector<uint8_t>& list, const std::string& field, std::vector<uint8_t>& out);
-Status read_pose_statistics(const schema::PoseStatistics& table, std::string_view owner, BlobReader& blobs, PoseStatistics& out);
+Status read_statistics_joints(const flatbuffers::Vector<uint8_t>& list, const std::string& field,
+                              std::vector<uint8_t>& out);
+Status read_pose_statistics(const schema::PoseStatistics& table, std::string_view owner,
+                            BlobReader& blobs, PoseStatistics& out);
 // Symmetric, positive definite beyond rounding, at most 1e4.
 Status check_covariance(std::span<const float> covariance, size_t n, const std::string& field);
 // Camera, background and root translation of a golden frame, without its rotations.
 Status read_golden_view(const schema::GoldenFrame& table, GoldenFrame& out);
-// out.rotations with the translation: at most kMaxJoints finite rotations that are none of zero length.
+// out.rotations with the translation: at most kMaxJoints finite rotations that are none of zero
+// length.
 Status check_golden_pose(const GoldenFrame& golden);
 // All of a golden frame: view, pose, hash, and the picture if there is one.
 Status read_golden(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFrame& out);

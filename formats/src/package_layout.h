@@ -1,6 +1,8 @@
-// The byte layout of a .fgn package that reader and writer share (docs/package.md): the 64-byte header, the alignment rule, the limits.
+// The byte layout of a .fgn package that reader and writer share (docs/package.md): the 64-byte
+// header, the alignment rule, the limits.
 //
-// Magic, version and header checksum keep their places in every version, so that any reader can tell a damaged file from a newer one.
+// Magic, version and header checksum keep their places in every version, so that any reader can
+// tell a damaged file from a newer one.
 #pragma once
 
 #include <array>
@@ -12,9 +14,11 @@
 
 namespace figurine::layout {
 
-static_assert(std::endian::native == std::endian::little, "packages are little-endian and read without conversion");
+static_assert(std::endian::native == std::endian::little,
+              "packages are little-endian and read without conversion");
 
-// A byte above 127, the name, both line ends and an end-of-file mark, as in PNG: damage by text-mode transfer shows at once.
+// A byte above 127, the name, both line ends and an end-of-file mark, as in PNG: damage by
+// text-mode transfer shows at once.
 inline constexpr std::array<uint8_t, 8> kMagic{0x8F, 'F', 'G', 'N', '\r', '\n', 0x1A, '\n'};
 
 struct Header {
@@ -35,9 +39,12 @@ inline constexpr size_t kSealedHeaderBytes = offsetof(Header, header_checksum);
 inline constexpr uint64_t kKnownRequiredFeatures = kFeatureFixedPoint;
 
 // The first multiple of the blob alignment at or after the offset. Offsets are below 2^63.
-constexpr uint64_t align_up(uint64_t offset) { return (offset + (kBlobAlignment - 1)) / kBlobAlignment * kBlobAlignment; }
+constexpr uint64_t align_up(uint64_t offset) {
+  return (offset + (kBlobAlignment - 1)) / kBlobAlignment * kBlobAlignment;
+}
 
-// Limits. They bound what opening a hostile package can cost, and are far above what the project's own packages need.
+// Limits. They bound what opening a hostile package can cost, and are far above what the project's
+// own packages need.
 inline constexpr uint32_t kMaxIndexBytes = 4u << 20;
 inline constexpr uint32_t kMaxIndexTables = 4096;
 inline constexpr uint32_t kMaxIndexDepth = 8;
@@ -49,12 +56,14 @@ inline constexpr uint32_t kMaxTextBytes = 4096;    // URLs, data sources, settin
 inline constexpr uint32_t kMaxListEntries = 1024;  // settings, sources, quality metrics, authors
 inline constexpr uint32_t kMaxFourierOctaves = 12;
 inline constexpr uint64_t kMaxValueBytes = 1u << 30;  // of one activation of a network
-inline constexpr float kMaxLengthM = 1000;            // of a body; catches files in other units before they become infinities
-inline constexpr float kMaxTranslationM = 1e6f;       // of a motion's root
+inline constexpr float kMaxLengthM =
+    1000;  // of a body; catches files in other units before they become infinities
+inline constexpr float kMaxTranslationM = 1e6f;  // of a motion's root
 inline constexpr float kMaxFramesPerSecond = 10000;
 inline constexpr uint32_t kMaxReportBytes = 256u << 10;  // of a sampler's evaluation
-// Of the floats of a sampler: no matrix's result and no sampled weight then leaves the range of a float. The largest are 4096 products of
-// 4096 products of normalised values: (1e6 * 127 * 4096)^2 * 65e6 = 2e31 of 3e38.
+// Of the floats of a sampler: no matrix's result and no sampled weight then leaves the range of a
+// float. The largest are 4096 products of 4096 products of normalised values: (1e6 * 127 * 4096)^2
+// * 65e6 = 2e31 of 3e38.
 inline constexpr float kMaxSamplerValue = 1e6f;
 
 }  // namespace figurine::layout

@@ -1,5 +1,6 @@
-// The meaning of a population package: one network whose initial weights fit it, members of distinct names, and for each of them
-// differences, shape, statistics and a pose of the right size that make a sound avatar.
+// The meaning of a population package: one network whose initial weights fit it, members of
+// distinct names, and for each of them differences, shape, statistics and a pose of the right size
+// that make a sound avatar.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,18 +14,22 @@ namespace figurine {
 
 namespace {
 
-constexpr float kMaxWeight = std::numeric_limits<float>::max() / 4;  // of initial weights and differences: their sum is finite
+constexpr float kMaxWeight = std::numeric_limits<float>::max() /
+                             4;  // of initial weights and differences: their sum is finite
 constexpr float kMaxScale = kMaxWeight / 127;
 
 using Strings = flatbuffers::Vector<flatbuffers::Offset<flatbuffers::String>>;
 
 // A list of texts; none if absent.
-Status read_texts(const Strings* list, const std::string& field, uint32_t max_bytes, bool allow_lines, std::vector<std::string>& out) {
+Status read_texts(const Strings* list, const std::string& field, uint32_t max_bytes,
+                  bool allow_lines, std::vector<std::string>& out) {
   if (list == nullptr) return {};
-  if (list->size() > layout::kMaxListEntries) return over_limit(field, "has more than ", layout::kMaxListEntries, " entries");
+  if (list->size() > layout::kMaxListEntries)
+    return over_limit(field, "has more than ", layout::kMaxListEntries, " entries");
   out.resize(list->size());
   for (uint32_t i = 0; i < list->size(); ++i) {
-    FIG_RETURN_IF_ERROR(read_text(list->Get(i), concatenate({field, "[", i, "]"}), max_bytes, out[i], allow_lines));
+    FIG_RETURN_IF_ERROR(
+        read_text(list->Get(i), concatenate({field, "[", i, "]"}), max_bytes, out[i], allow_lines));
   }
   return {};
 }
@@ -36,34 +41,44 @@ Status read_own_provenance(const schema::Member& table, Provenance& out) {
   FIG_RETURN_IF_ERROR(word(table.tool(), "tool", out.tool));
   FIG_RETURN_IF_ERROR(word(table.created(), "created", out.created));
   FIG_RETURN_IF_ERROR(word(table.licence_name(), "licence_name", out.licence_name));
-  FIG_RETURN_IF_ERROR(read_text(table.licence_url(), "licence_url", layout::kMaxTextBytes, out.licence_url));
+  FIG_RETURN_IF_ERROR(
+      read_text(table.licence_url(), "licence_url", layout::kMaxTextBytes, out.licence_url));
   FIG_RETURN_IF_ERROR(word(table.avatar_permission(), "avatar_permission", out.avatar_permission));
   FIG_RETURN_IF_ERROR(word(table.commercial_usage(), "commercial_usage", out.commercial_usage));
-  FIG_RETURN_IF_ERROR(read_text(table.depicted_person(), "depicted_person", layout::kMaxTextBytes, out.depicted_person));
-  FIG_RETURN_IF_ERROR(read_texts(table.sources(), "sources", layout::kMaxTextBytes, false, out.sources));
-  FIG_RETURN_IF_ERROR(read_texts(table.authors(), "authors", layout::kMaxNameBytes, false, out.authors));
+  FIG_RETURN_IF_ERROR(read_text(table.depicted_person(), "depicted_person", layout::kMaxTextBytes,
+                                out.depicted_person));
+  FIG_RETURN_IF_ERROR(
+      read_texts(table.sources(), "sources", layout::kMaxTextBytes, false, out.sources));
+  FIG_RETURN_IF_ERROR(
+      read_texts(table.authors(), "authors", layout::kMaxNameBytes, false, out.authors));
   std::vector<std::string> settings;
-  FIG_RETURN_IF_ERROR(read_texts(table.settings(), "settings", layout::kMaxTextBytes, true, settings));
+  FIG_RETURN_IF_ERROR(
+      read_texts(table.settings(), "settings", layout::kMaxTextBytes, true, settings));
   if (settings.size() % 2 != 0) return corrupt("settings", "the last key has no value");
   for (size_t i = 0; i < settings.size(); i += 2) {
-    if (settings[i].size() > layout::kMaxNameBytes) return over_limit("settings", "a key is longer than ", layout::kMaxNameBytes, " bytes");
+    if (settings[i].size() > layout::kMaxNameBytes)
+      return over_limit("settings", "a key is longer than ", layout::kMaxNameBytes, " bytes");
     if (!is_clean_text(settings[i], false)) return corrupt("settings", "a key has several lines");
     out.settings.push_back({settings[i], settings[i + 1]});
   }
   return {};
 }
 
-Status read_member_table(const schema::Member& table, size_t quality_count, PopulationMember& out, Provenance& own) {
+Status read_member_table(const schema::Member& table, size_t quality_count, PopulationMember& out,
+                         Provenance& own) {
   FIG_RETURN_IF_ERROR(read_text(table.name(), "name", layout::kMaxNameBytes, out.name));
   if (out.name.empty()) return corrupt("name", "is empty");
-  if (out.name.find('#') != std::string::npos) return corrupt("name", "has a '#' in it, which stands between a package and a member");
+  if (out.name.find('#') != std::string::npos)
+    return corrupt("name", "has a '#' in it, which stands between a package and a member");
   if (table.split() > schema::Split::MAX) return unsupported("split", "is unknown");
   out.split = static_cast<Split>(table.split());
   FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), "avatar", out.map_statistics));
   FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), "avatar", out.decoding));
   if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden_view(*table.golden(), out.golden));
-  if (const auto* quality = table.quality(); quality != nullptr) out.quality.assign(quality->begin(), quality->end());
-  if (out.quality.size() != quality_count) return corrupt("quality", "has ", out.quality.size(), " figures for ", quality_count, " names");
+  if (const auto* quality = table.quality(); quality != nullptr)
+    out.quality.assign(quality->begin(), quality->end());
+  if (out.quality.size() != quality_count)
+    return corrupt("quality", "has ", out.quality.size(), " figures for ", quality_count, " names");
   for (const double value : out.quality) {
     if (std::isinf(value)) return corrupt("quality", "a figure is infinite");
   }
@@ -73,7 +88,8 @@ Status read_member_table(const schema::Member& table, size_t quality_count, Popu
 Status read_members(const schema::Population& table, PopulationContent& out) {
   const auto& list = *table.members();
   if (list.size() < 1) return corrupt("population.members", "there is none");
-  if (list.size() > kMaxMembers) return over_limit("population.members", "has more than ", kMaxMembers, " entries");
+  if (list.size() > kMaxMembers)
+    return over_limit("population.members", "has more than ", kMaxMembers, " entries");
   Population& population = out.population;
   population.members.resize(list.size());
   out.own.resize(list.size());
@@ -82,9 +98,13 @@ Status read_members(const schema::Population& table, PopulationContent& out) {
   for (uint32_t m = 0; m < list.size(); ++m) {
     const std::string field = concatenate({"population.members[", m, "]"});
     PopulationMember& member = population.members[m];
-    FIG_RETURN_IF_ERROR(read_member_table(*list.Get(m), population.quality_names.size(), member, out.own[m]).within(field));
-    if (!names.insert(member.name).second) return corrupt(field, "'", member.name, "' is there twice");
-    if ((list.Get(m)->golden() != nullptr) != has_golden) return corrupt(field, "a golden pose is not there for all members or for none");
+    FIG_RETURN_IF_ERROR(
+        read_member_table(*list.Get(m), population.quality_names.size(), member, out.own[m])
+            .within(field));
+    if (!names.insert(member.name).second)
+      return corrupt(field, "'", member.name, "' is there twice");
+    if ((list.Get(m)->golden() != nullptr) != has_golden)
+      return corrupt(field, "a golden pose is not there for all members or for none");
   }
   return {};
 }
@@ -106,21 +126,26 @@ Status check_frequencies(std::span<const int16_t> frequency) {
       sum += frequency[k];
     }
     if (sum != int64_t{kRansTotal}) {
-      return corrupt("population.frequency", "row ", at / kRansValues, " has the sum ", sum, ", not ", kRansTotal);
+      return corrupt("population.frequency", "row ", at / kRansValues, " has the sum ", sum,
+                     ", not ", kRansTotal);
     }
   }
   return {};
 }
 
-Status read_int8(BlobReader& blobs, uint32_t members, uint32_t rows, uint32_t convolutions, Population& out) {
+Status read_int8(BlobReader& blobs, uint32_t members, uint32_t rows, uint32_t convolutions,
+                 Population& out) {
   FIG_RETURN_IF_ERROR(blobs.read("population.scale", {members, rows}, out.scale));
-  FIG_RETURN_IF_ERROR(blobs.read("population.frequency", {convolutions, uint32_t{kRansValues}}, out.frequency));
+  FIG_RETURN_IF_ERROR(
+      blobs.read("population.frequency", {convolutions, uint32_t{kRansValues}}, out.frequency));
   FIG_RETURN_IF_ERROR(blobs.read("population.code", {BlobReader::kAny}, out.code));
   FIG_RETURN_IF_ERROR(blobs.read("population.code_end", {members}, out.code_end));
   FIG_RETURN_IF_ERROR(check_scales(out.scale));
   FIG_RETURN_IF_ERROR(check_frequencies(out.frequency));
-  if (!std::is_sorted(out.code_end.begin(), out.code_end.end()) || out.code_end.back() != out.code.size()) {
-    return corrupt("population.code_end", "is not ascending, or does not end where population.code does");
+  if (!std::is_sorted(out.code_end.begin(), out.code_end.end()) ||
+      out.code_end.back() != out.code.size()) {
+    return corrupt("population.code_end",
+                   "is not ascending, or does not end where population.code does");
   }
   return {};
 }
@@ -138,24 +163,31 @@ Status read_differences(BlobReader& blobs, Population& out) {
   for (size_t i = 0; i < out.network.layers.size(); ++i) {
     const Layer& layer = out.network.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
-    FIG_RETURN_IF_ERROR(check_magnitude(layer.weights, concatenate({"initial.", i, ".weights"}), kMaxWeight));
+    FIG_RETURN_IF_ERROR(
+        check_magnitude(layer.weights, concatenate({"initial.", i, ".weights"}), kMaxWeight));
     weights += layer.weights.size();
     rows += layer.bias.size();
     ++convolutions;
   }
-  if (weights > std::numeric_limits<uint32_t>::max()) return over_limit("population.network", "has more than 2^32 weights");
+  if (weights > std::numeric_limits<uint32_t>::max())
+    return over_limit("population.network", "has more than 2^32 weights");
   const auto members = static_cast<uint32_t>(out.size()), channels = static_cast<uint32_t>(rows);
   FIG_RETURN_IF_ERROR(blobs.read("population.bias", {members, channels}, out.bias));
-  FIG_RETURN_IF_ERROR(check_magnitude(out.bias, "population.bias", std::numeric_limits<float>::max()));
-  if (out.coding == DifferenceCoding::kInt8) return read_int8(blobs, members, channels, convolutions, out);
-  FIG_RETURN_IF_ERROR(blobs.read("population.difference", {members, static_cast<uint32_t>(weights)}, out.difference));
+  FIG_RETURN_IF_ERROR(
+      check_magnitude(out.bias, "population.bias", std::numeric_limits<float>::max()));
+  if (out.coding == DifferenceCoding::kInt8)
+    return read_int8(blobs, members, channels, convolutions, out);
+  FIG_RETURN_IF_ERROR(blobs.read("population.difference", {members, static_cast<uint32_t>(weights)},
+                                 out.difference));
   return check_halves(out.difference, "population.difference");
 }
 
 Status read_statistics(const schema::Population& table, BlobReader& blobs, Population& out) {
   if (table.pose_joints() == nullptr) return {};
-  FIG_RETURN_IF_ERROR(read_statistics_joints(*table.pose_joints(), "population.pose_joints", out.pose_joints));
-  const auto members = static_cast<uint32_t>(out.size()), n = static_cast<uint32_t>(3 * out.pose_joints.size());
+  FIG_RETURN_IF_ERROR(
+      read_statistics_joints(*table.pose_joints(), "population.pose_joints", out.pose_joints));
+  const auto members = static_cast<uint32_t>(out.size()),
+             n = static_cast<uint32_t>(3 * out.pose_joints.size());
   FIG_RETURN_IF_ERROR(blobs.read("pose.mean", {members, n}, out.pose_mean));
   FIG_RETURN_IF_ERROR(check_magnitude(out.pose_mean, "pose.mean", 100));
   FIG_RETURN_IF_ERROR(blobs.read("pose.factor", {members, n * (n + 1) / 2}, out.pose_factor));
@@ -171,11 +203,13 @@ Status read_statistics(const schema::Population& table, BlobReader& blobs, Popul
 Status read_golden_poses(const schema::Population& table, BlobReader& blobs, Population& out) {
   if (table.members()->Get(0)->golden() == nullptr) return {};
   const auto members = static_cast<uint32_t>(out.size());
-  FIG_RETURN_IF_ERROR(blobs.read("golden.rotations", {members, BlobReader::kAny, 4}, out.golden_poses));
+  FIG_RETURN_IF_ERROR(
+      blobs.read("golden.rotations", {members, BlobReader::kAny, 4}, out.golden_poses));
   const size_t row = out.golden_poses.size() / members;
   for (uint32_t m = 0; m < members; ++m) {
     out.members[m].golden.rotations = out.golden_poses.subspan(m * row, row);
-    FIG_RETURN_IF_ERROR(check_golden_pose(out.members[m].golden).within(concatenate({"population.members[", m, "]"})));
+    FIG_RETURN_IF_ERROR(check_golden_pose(out.members[m].golden)
+                            .within(concatenate({"population.members[", m, "]"})));
   }
   return {};
 }
@@ -183,37 +217,47 @@ Status read_golden_poses(const schema::Population& table, BlobReader& blobs, Pop
 // Each member's head and maps against the network, as an avatar package's.
 Status check_members_fit(const Population& population, const Budget& budget) {
   for (size_t m = 0; m < population.size(); ++m) {
-    const Avatar avatar{
-        .fourier_octaves = population.fourier_octaves, .decoding = population.members[m].decoding, .network = population.network};
-    FIG_RETURN_IF_ERROR(check_network_fits(avatar, "avatar", budget).within(concatenate({"population.members[", m, "]"})));
+    const Avatar avatar{.fourier_octaves = population.fourier_octaves,
+                        .decoding = population.members[m].decoding,
+                        .network = population.network};
+    FIG_RETURN_IF_ERROR(check_network_fits(avatar, "avatar", budget)
+                            .within(concatenate({"population.members[", m, "]"})));
   }
   return {};
 }
 
 }  // namespace
 
-Status read_population(const schema::Index& index, BlobReader& blobs, const Budget& budget, PopulationContent& content) {
+Status read_population(const schema::Index& index, BlobReader& blobs, const Budget& budget,
+                       PopulationContent& content) {
   const schema::Population& table = *index.content_as_Population();
   Population& out = content.population;
   FIG_RETURN_IF_ERROR(read_text(index.name(), "population.name", layout::kMaxNameBytes, out.name));
-  FIG_RETURN_IF_ERROR(read_text(table.body_name(), "population.body_name", layout::kMaxNameBytes, out.body_name));
-  FIG_RETURN_IF_ERROR(read_text(table.preset(), "population.preset", layout::kMaxNameBytes, out.preset));
+  FIG_RETURN_IF_ERROR(
+      read_text(table.body_name(), "population.body_name", layout::kMaxNameBytes, out.body_name));
+  FIG_RETURN_IF_ERROR(
+      read_text(table.preset(), "population.preset", layout::kMaxNameBytes, out.preset));
   out.body_hash = {table.body_hash_low(), table.body_hash_high()};
-  if (table.template_mode() > schema::TemplateMode::MAX) return unsupported("population.template_mode", "is unknown");
+  if (table.template_mode() > schema::TemplateMode::MAX)
+    return unsupported("population.template_mode", "is unknown");
   out.template_mode = static_cast<TemplateMode>(table.template_mode());
   out.fourier_octaves = table.fourier_octaves();
-  if (table.coding() > schema::DifferenceCoding::MAX) return unsupported("population.coding", "is unknown");
+  if (table.coding() > schema::DifferenceCoding::MAX)
+    return unsupported("population.coding", "is unknown");
   out.coding = static_cast<DifferenceCoding>(table.coding());
-  FIG_RETURN_IF_ERROR(read_texts(table.quality_names(), "population.quality_names", layout::kMaxNameBytes, false, out.quality_names));
+  FIG_RETURN_IF_ERROR(read_texts(table.quality_names(), "population.quality_names",
+                                 layout::kMaxNameBytes, false, out.quality_names));
   FIG_RETURN_IF_ERROR(read_members(table, content));
   FIG_RETURN_IF_ERROR(read_layers(*table.network(), out.network));
   FIG_RETURN_IF_ERROR(check_members_fit(out, budget));
   FIG_RETURN_IF_ERROR(read_convolutions(blobs, "initial", BlobReader::kRequired, out.network));
   FIG_RETURN_IF_ERROR(read_differences(blobs, out));
   const auto members = static_cast<uint32_t>(out.size());
-  FIG_RETURN_IF_ERROR(blobs.read("population.shape", {members, BlobReader::kAny}, out.shape, BlobReader::kMayBeAbsent));
+  FIG_RETURN_IF_ERROR(blobs.read("population.shape", {members, BlobReader::kAny}, out.shape,
+                                 BlobReader::kMayBeAbsent));
   if (out.shape.size() > size_t{kMaxShapeCoefficients} * members) {
-    return over_limit("population.shape", "has more than ", kMaxShapeCoefficients, " coefficients a member");
+    return over_limit("population.shape", "has more than ", kMaxShapeCoefficients,
+                      " coefficients a member");
   }
   FIG_RETURN_IF_ERROR(check_magnitude(out.shape, "population.shape", 1000));
   FIG_RETURN_IF_ERROR(read_statistics(table, blobs, out));

@@ -1,8 +1,9 @@
-// The meaning of a sampler package: a network that sampled weights fit, a space of weights and a denoiser whose arrays have the sizes that
-// their shapes say and whose arithmetic is defined, a schedule and steps that a solver can take.
+// The meaning of a sampler package: a network that sampled weights fit, a space of weights and a
+// denoiser whose arrays have the sizes that their shapes say and whose arithmetic is defined, a
+// schedule and steps that a solver can take.
 //
-// What every product of sizes is at most: 257 tokens, 4096 directions each, 2^28 values each. 64 bits hold all of them; a blob's length is
-// 32 bits.
+// What every product of sizes is at most: 257 tokens, 4096 directions each, 2^28 values each. 64
+// bits hold all of them; a blob's length is 32 bits.
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -17,11 +18,14 @@ namespace {
 
 // What a blob's length can be.
 Status check_length(uint64_t length, const char* field) {
-  return length <= std::numeric_limits<uint32_t>::max() ? Status() : over_limit(field, "would have more than 2^32 values");
+  return length <= std::numeric_limits<uint32_t>::max()
+             ? Status()
+             : over_limit(field, "would have more than 2^32 values");
 }
 
 Status read_quantisation(const schema::Sampler& table, Sampler& out) {
-  if (table.values()->size() > kMaxLayers) return over_limit("sampler.values", "has more than ", kMaxLayers, " entries");
+  if (table.values()->size() > kMaxLayers)
+    return over_limit("sampler.values", "has more than ", kMaxLayers, " entries");
   for (const schema::Quantisation* entry : *table.values()) {
     out.values.push_back({.scale = entry->scale(), .zero_point = entry->zero_point()});
   }
@@ -30,41 +34,55 @@ Status read_quantisation(const schema::Sampler& table, Sampler& out) {
 
 // What all its avatars share, up to their weights.
 Status read_shared(const schema::Sampler& table, const Budget& budget, Sampler& out) {
-  FIG_RETURN_IF_ERROR(read_text(table.body_name(), "sampler.body_name", layout::kMaxNameBytes, out.body_name));
-  FIG_RETURN_IF_ERROR(read_text(table.preset(), "sampler.preset", layout::kMaxNameBytes, out.preset));
+  FIG_RETURN_IF_ERROR(
+      read_text(table.body_name(), "sampler.body_name", layout::kMaxNameBytes, out.body_name));
+  FIG_RETURN_IF_ERROR(
+      read_text(table.preset(), "sampler.preset", layout::kMaxNameBytes, out.preset));
   out.body_hash = {table.body_hash_low(), table.body_hash_high()};
-  if (table.template_mode() > schema::TemplateMode::MAX) return unsupported("sampler.template_mode", "is unknown");
+  if (table.template_mode() > schema::TemplateMode::MAX)
+    return unsupported("sampler.template_mode", "is unknown");
   out.template_mode = static_cast<TemplateMode>(table.template_mode());
   out.fourier_octaves = table.fourier_octaves();
   out.shape_count = table.shape_count();
-  if (out.shape_count > kMaxShapeCoefficients) return over_limit("sampler.shape_count", "is above ", kMaxShapeCoefficients);
+  if (out.shape_count > kMaxShapeCoefficients)
+    return over_limit("sampler.shape_count", "is above ", kMaxShapeCoefficients);
   FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), "sampler", out.map_statistics));
   FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), "sampler", out.decoding));
   FIG_RETURN_IF_ERROR(read_layers(*table.network(), out.network));
-  const Avatar avatar{.fourier_octaves = out.fourier_octaves, .decoding = out.decoding, .network = out.network};
+  const Avatar avatar{
+      .fourier_octaves = out.fourier_octaves, .decoding = out.decoding, .network = out.network};
   FIG_RETURN_IF_ERROR(check_network_fits(avatar, "sampler", budget));
   return read_quantisation(table, out);
 }
 
 Status read_ranks(const schema::Sampler& table, size_t tokens, Sampler& out) {
   const auto& list = *table.ranks();
-  if (list.size() != tokens) return corrupt("sampler.ranks", "has ", list.size(), " entries for ", tokens, " tokens");
+  if (list.size() != tokens)
+    return corrupt("sampler.ranks", "has ", list.size(), " entries for ", tokens, " tokens");
   out.ranks.assign(list.begin(), list.end());
   for (size_t token = 0; token < tokens; ++token) {
     if (out.ranks[token] >= 1 && out.ranks[token] <= kMaxDenoiserWidth) continue;
-    return corrupt("sampler.ranks", "token ", token, " has ", out.ranks[token], " directions, not 1 to ", kMaxDenoiserWidth);
+    return corrupt("sampler.ranks", "token ", token, " has ", out.ranks[token],
+                   " directions, not 1 to ", kMaxDenoiserWidth);
   }
   return {};
 }
 
 Status read_denoiser_shape(const schema::Denoiser& table, DenoiserShape& out) {
-  out = {.d_model = table.d_model(), .blocks = table.blocks(), .heads = table.heads(), .feed_forward = table.feed_forward()};
+  out = {.d_model = table.d_model(),
+         .blocks = table.blocks(),
+         .heads = table.heads(),
+         .feed_forward = table.feed_forward()};
   const auto within = [](uint32_t value, uint32_t max) { return value >= 1 && value <= max; };
-  if (!within(out.d_model, kMaxDenoiserWidth)) return corrupt("sampler.denoiser.d_model", "is not 1 to ", kMaxDenoiserWidth);
-  if (!within(out.blocks, kMaxDenoiserBlocks)) return corrupt("sampler.denoiser.blocks", "is not 1 to ", kMaxDenoiserBlocks);
-  if (!within(out.feed_forward, kMaxDenoiserWidth)) return corrupt("sampler.denoiser.feed_forward", "is not 1 to ", kMaxDenoiserWidth);
+  if (!within(out.d_model, kMaxDenoiserWidth))
+    return corrupt("sampler.denoiser.d_model", "is not 1 to ", kMaxDenoiserWidth);
+  if (!within(out.blocks, kMaxDenoiserBlocks))
+    return corrupt("sampler.denoiser.blocks", "is not 1 to ", kMaxDenoiserBlocks);
+  if (!within(out.feed_forward, kMaxDenoiserWidth))
+    return corrupt("sampler.denoiser.feed_forward", "is not 1 to ", kMaxDenoiserWidth);
   if (!within(out.heads, kMaxDenoiserWidth) || out.d_model % (2 * out.heads) != 0) {
-    return corrupt("sampler.denoiser.heads", "is ", out.heads, ", of which two do not divide d_model ", out.d_model);
+    return corrupt("sampler.denoiser.heads", "is ", out.heads,
+                   ", of which two do not divide d_model ", out.d_model);
   }
   return {};
 }
@@ -73,10 +91,12 @@ Status read_denoiser_shape(const schema::Denoiser& table, DenoiserShape& out) {
 Status check_symmetric(std::span<const int8_t> values, const char* field) {
   const void* found = std::memchr(values.data(), 0x80, values.size());
   if (found == nullptr) return {};
-  return corrupt(field, "value ", static_cast<const int8_t*>(found) - values.data(), " is -128; weights are symmetric");
+  return corrupt(field, "value ", static_cast<const int8_t*>(found) - values.data(),
+                 " is -128; weights are symmetric");
 }
 
-Status read_floats(BlobReader& blobs, const char* name, std::initializer_list<uint32_t> shape, std::span<const float>& out) {
+Status read_floats(BlobReader& blobs, const char* name, std::initializer_list<uint32_t> shape,
+                   std::span<const float>& out) {
   FIG_RETURN_IF_ERROR(blobs.read(name, shape, out));
   return check_magnitude(out, name, layout::kMaxSamplerValue);
 }
@@ -92,11 +112,14 @@ Status read_space(BlobReader& blobs, std::span<const size_t> tokens, Sampler& ou
   FIG_RETURN_IF_ERROR(check_length(values, "space.mean"));
   FIG_RETURN_IF_ERROR(check_length(bytes, "space.directions"));
   FIG_RETURN_IF_ERROR(read_floats(blobs, "space.mean", {static_cast<uint32_t>(values)}, out.mean));
-  FIG_RETURN_IF_ERROR(blobs.read("space.directions", {static_cast<uint32_t>(bytes)}, out.directions));
+  FIG_RETURN_IF_ERROR(
+      blobs.read("space.directions", {static_cast<uint32_t>(bytes)}, out.directions));
   FIG_RETURN_IF_ERROR(check_symmetric(out.directions, "space.directions"));
-  FIG_RETURN_IF_ERROR(read_floats(blobs, "space.direction_scale", {static_cast<uint32_t>(directions)}, out.direction_scale));
+  FIG_RETURN_IF_ERROR(read_floats(blobs, "space.direction_scale",
+                                  {static_cast<uint32_t>(directions)}, out.direction_scale));
   for (size_t k = 0; k < out.direction_scale.size(); ++k) {
-    if (out.direction_scale[k] < 0) return corrupt("space.direction_scale", "value ", k, " is negative");
+    if (out.direction_scale[k] < 0)
+      return corrupt("space.direction_scale", "value ", k, " is negative");
   }
   return {};
 }
@@ -108,8 +131,10 @@ Status read_denoiser(BlobReader& blobs, Sampler& out) {
     bytes += uint64_t{matrix.rows} * matrix.columns;
   }
   FIG_RETURN_IF_ERROR(check_length(bytes, "denoiser.matrices"));
-  const auto all_rows = static_cast<uint32_t>(rows), tokens = static_cast<uint32_t>(out.ranks.size());  // fewer rows than bytes
-  FIG_RETURN_IF_ERROR(blobs.read("denoiser.matrices", {static_cast<uint32_t>(bytes)}, out.matrices));
+  const auto all_rows = static_cast<uint32_t>(rows),
+             tokens = static_cast<uint32_t>(out.ranks.size());  // fewer rows than bytes
+  FIG_RETURN_IF_ERROR(
+      blobs.read("denoiser.matrices", {static_cast<uint32_t>(bytes)}, out.matrices));
   FIG_RETURN_IF_ERROR(check_symmetric(out.matrices, "denoiser.matrices"));
   FIG_RETURN_IF_ERROR(read_floats(blobs, "denoiser.row_scale", {all_rows}, out.row_scale));
   for (size_t n = 0; n < out.row_scale.size(); ++n) {
@@ -118,12 +143,16 @@ Status read_denoiser(BlobReader& blobs, Sampler& out) {
     }
   }
   FIG_RETURN_IF_ERROR(read_floats(blobs, "denoiser.bias", {all_rows}, out.bias));
-  FIG_RETURN_IF_ERROR(read_floats(blobs, "denoiser.position", {tokens + 1, out.denoiser.d_model}, out.position));
-  return read_floats(blobs, "denoiser.norm", {2 * out.denoiser.blocks + 1, 2, out.denoiser.d_model}, out.norm);
+  FIG_RETURN_IF_ERROR(
+      read_floats(blobs, "denoiser.position", {tokens + 1, out.denoiser.d_model}, out.position));
+  return read_floats(blobs, "denoiser.norm", {2 * out.denoiser.blocks + 1, 2, out.denoiser.d_model},
+                     out.norm);
 }
 
-Status read_solver(uint32_t steps, schema::SolverMethod method, const std::string& field, SolverMethod& out) {
-  if (steps < 1 || steps > kMaxSolverSteps) return corrupt(field + ".steps", "is ", steps, ", not 1 to ", kMaxSolverSteps);
+Status read_solver(uint32_t steps, schema::SolverMethod method, const std::string& field,
+                   SolverMethod& out) {
+  if (steps < 1 || steps > kMaxSolverSteps)
+    return corrupt(field + ".steps", "is ", steps, ", not 1 to ", kMaxSolverSteps);
   if (method > schema::SolverMethod::MAX) return unsupported(field + ".method", "is unknown");
   out = static_cast<SolverMethod>(method);
   return {};
@@ -136,17 +165,21 @@ Status read_sampling(const schema::Sampler& table, Sampler& out) {
                .decided_dimension_snr = noise.decided_dimension_snr(),
                .clean_snr = noise.clean_snr(),
                .band_share = noise.band_share()};
-  if (const auto schedule = NoiseSchedule::create(out.noise); !schedule.ok()) return corrupt("sampler.noise", schedule.status().message());
+  if (const auto schedule = NoiseSchedule::create(out.noise); !schedule.ok())
+    return corrupt("sampler.noise", schedule.status().message());
   out.steps = table.steps();
   FIG_RETURN_IF_ERROR(read_solver(table.steps(), table.method(), "sampler", out.method));
   if (table.golden_seeds() == nullptr) return {};
   if (table.golden_seeds()->size() > layout::kMaxListEntries) {
-    return over_limit("sampler.golden_seeds", "has more than ", layout::kMaxListEntries, " entries");
+    return over_limit("sampler.golden_seeds", "has more than ", layout::kMaxListEntries,
+                      " entries");
   }
   for (const schema::GoldenSeed* entry : *table.golden_seeds()) {
     const std::string field = concatenate({"sampler.golden_seeds[", out.golden_seeds.size(), "]"});
     GoldenSeed& seed = out.golden_seeds.emplace_back();
-    seed = {.seed = entry->seed(), .steps = entry->steps(), .hash = {entry->hash_low(), entry->hash_high()}};
+    seed = {.seed = entry->seed(),
+            .steps = entry->steps(),
+            .hash = {entry->hash_low(), entry->hash_high()}};
     FIG_RETURN_IF_ERROR(read_solver(entry->steps(), entry->method(), field, seed.method));
   }
   return {};
@@ -156,34 +189,45 @@ Status read_sampling(const schema::Sampler& table, Sampler& out) {
 Status read_golden_frame(const schema::GoldenFrame& table, BlobReader& blobs, GoldenFrame& out) {
   FIG_RETURN_IF_ERROR(read_golden(table, blobs, out));
   if (!out.png.empty()) return corrupt("golden.png", "is there, a sampler has no picture");
-  if (out.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) return corrupt("golden.fixed_point_hash", "is there, a sampler has none");
-  return out.fixed_point_library.empty() ? Status() : corrupt("golden.fixed_point_library", "is there, a sampler has none");
+  if (out.fixed_point_hash != std::array<uint64_t, 2>{0, 0})
+    return corrupt("golden.fixed_point_hash", "is there, a sampler has none");
+  return out.fixed_point_library.empty()
+             ? Status()
+             : corrupt("golden.fixed_point_library", "is there, a sampler has none");
 }
 
 Status read_report(BlobReader& blobs, std::string_view& out) {
   std::span<const uint8_t> bytes;
-  FIG_RETURN_IF_ERROR(blobs.read("sampler.report", {BlobReader::kAny}, bytes, BlobReader::kMayBeAbsent));
-  if (bytes.size() > layout::kMaxReportBytes) return over_limit("sampler.report", "is longer than ", layout::kMaxReportBytes, " bytes");
+  FIG_RETURN_IF_ERROR(
+      blobs.read("sampler.report", {BlobReader::kAny}, bytes, BlobReader::kMayBeAbsent));
+  if (bytes.size() > layout::kMaxReportBytes)
+    return over_limit("sampler.report", "is longer than ", layout::kMaxReportBytes, " bytes");
   out = {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-  return is_clean_text(out, true) ? Status() : corrupt("sampler.report", "is not UTF-8 text without control characters");
+  return is_clean_text(out, true)
+             ? Status()
+             : corrupt("sampler.report", "is not UTF-8 text without control characters");
 }
 
 }  // namespace
 
-Status read_sampler(const schema::Index& index, BlobReader& blobs, const Budget& budget, Sampler& out) {
+Status read_sampler(const schema::Index& index, BlobReader& blobs, const Budget& budget,
+                    Sampler& out) {
   const schema::Sampler& table = *index.content_as_Sampler();
   FIG_RETURN_IF_ERROR(read_text(index.name(), "sampler.name", layout::kMaxNameBytes, out.name));
   FIG_RETURN_IF_ERROR(read_shared(table, budget, out));
-  const std::vector<size_t> tokens = sampler_token_sizes(out);  // the network's shapes are valid from here on
+  const std::vector<size_t> tokens =
+      sampler_token_sizes(out);  // the network's shapes are valid from here on
   FIG_RETURN_IF_ERROR(read_ranks(table, tokens.size(), out));
   FIG_RETURN_IF_ERROR(read_denoiser_shape(*table.denoiser(), out.denoiser));
   FIG_RETURN_IF_ERROR(read_space(blobs, tokens, out));
   FIG_RETURN_IF_ERROR(read_denoiser(blobs, out));
   FIG_RETURN_IF_ERROR(read_sampling(table, out));
   if (table.pose_statistics() != nullptr) {
-    FIG_RETURN_IF_ERROR(read_pose_statistics(*table.pose_statistics(), "sampler", blobs, out.pose_statistics));
+    FIG_RETURN_IF_ERROR(
+        read_pose_statistics(*table.pose_statistics(), "sampler", blobs, out.pose_statistics));
   }
-  if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden_frame(*table.golden(), blobs, out.golden));
+  if (table.golden() != nullptr)
+    FIG_RETURN_IF_ERROR(read_golden_frame(*table.golden(), blobs, out.golden));
   out.population_hash = {table.population_hash_low(), table.population_hash_high()};
   return read_report(blobs, out.report);
 }

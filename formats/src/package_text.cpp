@@ -24,7 +24,8 @@ bool is_clean_text(std::string_view text, bool allow_lines) {
       value = value << 6 | (byte(i + k) & 0x3Fu);
     }
     constexpr uint32_t kSmallest[5] = {0, 0, 0x80, 0x800, 0x10000};
-    if (value < kSmallest[length] || value > 0x10FFFF || (value >= 0xD800 && value <= 0xDFFF)) return false;
+    if (value < kSmallest[length] || value > 0x10FFFF || (value >= 0xD800 && value <= 0xDFFF))
+      return false;
     if (value < 0xA0) return false;  // U+0080..9F
     i += length;
   }

@@ -5,8 +5,9 @@
 
 namespace figurine {
 
-// Well-formed UTF-8 (no overlong forms, surrogates or values above U+10FFFF) without control characters (U+0000..1F, U+7F..9F), so that a
-// name cannot steer a terminal. Tab and newline are let through where allow_lines is set.
+// Well-formed UTF-8 (no overlong forms, surrogates or values above U+10FFFF) without control
+// characters (U+0000..1F, U+7F..9F), so that a name cannot steer a terminal. Tab and newline are
+// let through where allow_lines is set.
 bool is_clean_text(std::string_view text, bool allow_lines);
 
 // Not empty, [a-z0-9_.] only.

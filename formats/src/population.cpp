@@ -28,7 +28,8 @@ std::span<const uint8_t> stream_of(const Population& population, size_t member) 
 }
 
 // out = initial + scale q, convolution by convolution.
-void add_int8(const Population& population, size_t member, std::span<const float> scale, std::span<float> out) {
+void add_int8(const Population& population, size_t member, std::span<const float> scale,
+              std::span<float> out) {
   RansDecoder decoder(stream_of(population, member));
   size_t at = 0, row = 0, convolution = 0;
   for (const Layer& layer : population.network.layers) {
@@ -36,13 +37,15 @@ void add_int8(const Population& population, size_t member, std::span<const float
     const RansTable table(population.frequency.subspan(convolution++ * kRansValues, kRansValues));
     const size_t row_size = layer.weights.size() / layer.bias.size();
     for (size_t k = 0; k < layer.weights.size(); ++k, ++at) {
-      out[at] = layer.weights[k] + scale[row + k / row_size] * static_cast<float>(decoder.next(table));
+      out[at] =
+          layer.weights[k] + scale[row + k / row_size] * static_cast<float>(decoder.next(table));
     }
     row += layer.bias.size();
   }
 }
 
-void add_half(const Population& population, std::span<const Half> difference, std::span<float> out) {
+void add_half(const Population& population, std::span<const Half> difference,
+              std::span<float> out) {
   size_t at = 0;
   for (const Layer& layer : population.network.layers) {
     for (const float initial : layer.weights) {
@@ -61,14 +64,21 @@ std::span<const T> row_of(std::span<const T> array, const Population& population
 
 }  // namespace
 
-const char* to_string(DifferenceCoding coding) { return coding == DifferenceCoding::kInt8 ? "q8" : "f16"; }
+const char* to_string(DifferenceCoding coding) {
+  return coding == DifferenceCoding::kInt8 ? "q8" : "f16";
+}
 
-const char* to_string(Split split) { return split == Split::kTrain ? "train" : split == Split::kValidation ? "validation" : "test"; }
+const char* to_string(Split split) {
+  return split == Split::kTrain ? "train" : split == Split::kValidation ? "validation" : "test";
+}
 
 uint64_t difference_bytes(const Population& population, size_t member) {
-  const auto rows = [&](const auto& array) { return row_of(array, population, member).size_bytes(); };
-  const size_t differences = population.coding == DifferenceCoding::kInt8 ? rows(population.scale) + stream_of(population, member).size()
-                                                                          : rows(population.difference);
+  const auto rows = [&](const auto& array) {
+    return row_of(array, population, member).size_bytes();
+  };
+  const size_t differences = population.coding == DifferenceCoding::kInt8
+                                 ? rows(population.scale) + stream_of(population, member).size()
+                                 : rows(population.difference);
   return rows(population.bias) + differences;
 }
 
@@ -79,7 +89,9 @@ void pose_covariance(const Population& population, size_t member, std::span<floa
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j <= i; ++j) {
       double sum = 0;
-      for (size_t k = 0; k <= j; ++k) sum += double(to_float(factor[i * (i + 1) / 2 + k])) * to_float(factor[j * (j + 1) / 2 + k]);
+      for (size_t k = 0; k <= j; ++k)
+        sum +=
+            double(to_float(factor[i * (i + 1) / 2 + k])) * to_float(factor[j * (j + 1) / 2 + k]);
       covariance[i * n + j] = covariance[j * n + i] = static_cast<float>(sum);
     }
   }
@@ -125,7 +137,8 @@ Avatar open_member(const Population& population, size_t member, std::span<float>
   if (const size_t features = 3 * population.pose_joints.size(); features > 0) {
     const std::span<float> covariance = storage.subspan(counts.weights, features * features);
     pose_covariance(population, member, covariance);
-    avatar.pose_statistics = {population.pose_joints, row_of(population.pose_mean, population, member), covariance};
+    avatar.pose_statistics = {population.pose_joints,
+                              row_of(population.pose_mean, population, member), covariance};
   }
   return avatar;
 }
@@ -137,7 +150,8 @@ std::optional<size_t> find_member(const Population& population, std::string_view
   size_t number = 0;
   const char* const end = name_or_number.data() + name_or_number.size();
   const auto parsed = std::from_chars(name_or_number.data(), end, number);
-  if (parsed.ec != std::errc{} || parsed.ptr != end || number >= population.size()) return std::nullopt;
+  if (parsed.ec != std::errc{} || parsed.ptr != end || number >= population.size())
+    return std::nullopt;
   return number;
 }
 

@@ -4,10 +4,15 @@
 
 namespace figurine {
 
-size_t Word::print(uint64_t value, char (&digits)[kDigits]) { return size_t(std::to_chars(digits, digits + kDigits, value).ptr - digits); }
-size_t Word::print(int64_t value, char (&digits)[kDigits]) { return size_t(std::to_chars(digits, digits + kDigits, value).ptr - digits); }
+size_t Word::print(uint64_t value, char (&digits)[kDigits]) {
+  return size_t(std::to_chars(digits, digits + kDigits, value).ptr - digits);
+}
+size_t Word::print(int64_t value, char (&digits)[kDigits]) {
+  return size_t(std::to_chars(digits, digits + kDigits, value).ptr - digits);
+}
 size_t Word::print(double value, char (&digits)[kDigits]) {
-  return size_t(std::to_chars(digits, digits + kDigits, value, std::chars_format::general, 7).ptr - digits);
+  return size_t(std::to_chars(digits, digits + kDigits, value, std::chars_format::general, 7).ptr -
+                digits);
 }
 
 std::string concatenate(std::initializer_list<Word> words) {

@@ -1,5 +1,5 @@
-// How the reader says no: "field: reason" in one line. Out of line, so that a hundred reasons cost a device a few kilobytes rather than a
-// hundred inlined string concatenations.
+// How the reader says no: "field: reason" in one line. Out of line, so that a hundred reasons cost
+// a device a few kilobytes rather than a hundred inlined string concatenations.
 #pragma once
 
 #include <concepts>

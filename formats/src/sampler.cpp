@@ -4,7 +4,9 @@
 
 namespace figurine {
 
-const char* to_string(SolverMethod method) { return method == SolverMethod::kDdim ? "ddim" : "dpmpp2m"; }
+const char* to_string(SolverMethod method) {
+  return method == SolverMethod::kDdim ? "ddim" : "dpmpp2m";
+}
 
 std::vector<size_t> sampler_token_sizes(const Sampler& sampler) {
   const Result<std::vector<ValueShape>> shapes = infer_shapes(sampler.network, false);
@@ -19,13 +21,15 @@ std::vector<size_t> sampler_token_sizes(const Sampler& sampler) {
   return sizes;
 }
 
-std::vector<MatrixShape> denoiser_matrices(const DenoiserShape& shape, std::span<const uint32_t> ranks) {
+std::vector<MatrixShape> denoiser_matrices(const DenoiserShape& shape,
+                                           std::span<const uint32_t> ranks) {
   const uint32_t d = shape.d_model, f = shape.feed_forward;
   std::vector<MatrixShape> matrices;
   for (const uint32_t rank : ranks) matrices.push_back({d, rank});
   matrices.insert(matrices.end(), 2, {d, d});
   for (uint32_t b = 0; b < shape.blocks; ++b) {
-    for (const MatrixShape& matrix : {MatrixShape{3 * d, d}, MatrixShape{d, d}, MatrixShape{f, d}, MatrixShape{d, f}}) {
+    for (const MatrixShape& matrix :
+         {MatrixShape{3 * d, d}, MatrixShape{d, d}, MatrixShape{f, d}, MatrixShape{d, f}}) {
       matrices.push_back(matrix);
     }
   }

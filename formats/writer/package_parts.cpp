@@ -13,23 +13,31 @@ class PartList {
  public:
   explicit PartList(std::vector<BlobPart>& blobs) : blobs_(blobs) {}
 
-  // inner: the trailing lengths of the shape; the first one follows from the array. Empty arrays make no blob.
+  // inner: the trailing lengths of the shape; the first one follows from the array. Empty arrays
+  // make no blob.
   template <class T>
-  void add(const std::string& name, std::span<const T> values, const std::vector<uint32_t>& inner = {}, size_t expected_first = 0) {
+  void add(const std::string& name, std::span<const T> values,
+           const std::vector<uint32_t>& inner = {}, size_t expected_first = 0) {
     if (values.empty() && expected_first == 0) return;
     uint64_t row = 1;
     for (uint32_t length : inner) row *= length;
     const uint64_t first = row == 0 ? 0 : values.size() / row;
-    const bool fits = row != 0 && first * row == values.size() && first <= std::numeric_limits<uint32_t>::max();
+    const bool fits =
+        row != 0 && first * row == values.size() && first <= std::numeric_limits<uint32_t>::max();
     if (!fits || (expected_first != 0 && first != expected_first)) {
       if (status_.ok()) {
-        status_ = Status(StatusCode::kInvalidArgument,
-                         name + ": has " + std::to_string(values.size()) + " values, rows of " + std::to_string(row) +
-                             (expected_first != 0 ? ", needs " + std::to_string(expected_first) + " rows" : ""));
+        status_ = Status(
+            StatusCode::kInvalidArgument,
+            name + ": has " + std::to_string(values.size()) + " values, rows of " +
+                std::to_string(row) +
+                (expected_first != 0 ? ", needs " + std::to_string(expected_first) + " rows" : ""));
       }
       return;
     }
-    BlobPart part{.name = name, .type = type_of(T{}), .shape = {static_cast<uint32_t>(first)}, .bytes = std::as_bytes(values)};
+    BlobPart part{.name = name,
+                  .type = type_of(T{}),
+                  .shape = {static_cast<uint32_t>(first)},
+                  .bytes = std::as_bytes(values)};
     part.shape.insert(part.shape.end(), inner.begin(), inner.end());
     blobs_.push_back(std::move(part));
   }
@@ -49,12 +57,14 @@ class PartList {
   Status status_;
 };
 
-void add_float_weights(const std::string& prefix, const Network& network, const std::vector<ValueShape>& shapes, PartList& list) {
+void add_float_weights(const std::string& prefix, const Network& network,
+                       const std::vector<ValueShape>& shapes, PartList& list) {
   for (size_t i = 0; i < network.layers.size(); ++i) {
     const Layer& layer = network.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
     const std::string name = prefix + "." + std::to_string(i);
-    list.add(name + ".weights", layer.weights, {layer.kernel, layer.kernel, shapes[layer.inputs[0]].channels}, layer.out_channels);
+    list.add(name + ".weights", layer.weights,
+             {layer.kernel, layer.kernel, shapes[layer.inputs[0]].channels}, layer.out_channels);
     list.add(name + ".bias", layer.bias, {}, layer.out_channels);
   }
 }
@@ -65,7 +75,8 @@ void add_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& shapes
     if (layer.op != LayerOp::kConv2d) continue;
     const FixedPointConvolution& convolution = avatar.fixed_point.convolutions[i];
     const std::string name = "fixed." + std::to_string(i);
-    list.add(name + ".weights", convolution.weights, {layer.kernel, layer.kernel, shapes[layer.inputs[0]].channels}, layer.out_channels);
+    list.add(name + ".weights", convolution.weights,
+             {layer.kernel, layer.kernel, shapes[layer.inputs[0]].channels}, layer.out_channels);
     list.add(name + ".scale", convolution.weight_scale, {}, layer.out_channels);
     list.add(name + ".bias", convolution.bias, {}, layer.out_channels);
   }
@@ -101,9 +112,12 @@ Result<PackageParts> take_apart(const Body& body, const Provenance& provenance) 
   return parts;
 }
 
-Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget, const Provenance& provenance) {
-  PackageParts parts{.kind = PackageKind::kAvatar, .content = &avatar, .budget = budget, .provenance = provenance};
-  // The list's shapes say how the weights are laid out; their number is checked against them here, their values by the reader.
+Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget,
+                                const Provenance& provenance) {
+  PackageParts parts{
+      .kind = PackageKind::kAvatar, .content = &avatar, .budget = budget, .provenance = provenance};
+  // The list's shapes say how the weights are laid out; their number is checked against them here,
+  // their values by the reader.
   const bool has_floats = avatar.holds(Precision::kFloat32) || avatar.fixed_point.empty();
   const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, has_floats);
   if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
@@ -131,19 +145,25 @@ Result<PackageParts> take_apart(const Motion& motion, const Provenance& provenan
   PackageParts parts{.kind = PackageKind::kMotion, .content = &motion, .provenance = provenance};
   PartList list(parts.blobs);
   list.add("motion.root_translation", motion.root_translation_m, {3}, motion.frame_count);
-  list.add("motion.rotations", motion.rotations, {static_cast<uint32_t>(motion.joint_names.size()), 4}, motion.frame_count);
+  list.add("motion.rotations", motion.rotations,
+           {static_cast<uint32_t>(motion.joint_names.size()), 4}, motion.frame_count);
   if (!list.status().ok()) return list.status();
   return parts;
 }
 
-Result<PackageParts> take_apart(const Population& population, const Budget& budget, const Provenance& provenance,
-                                std::span<const Provenance> own) {
+Result<PackageParts> take_apart(const Population& population, const Budget& budget,
+                                const Provenance& provenance, std::span<const Provenance> own) {
   const Population& p = population;
-  PackageParts parts{.kind = PackageKind::kPopulation, .content = &p, .budget = budget, .provenance = provenance, .member_provenance = own};
+  PackageParts parts{.kind = PackageKind::kPopulation,
+                     .content = &p,
+                     .budget = budget,
+                     .provenance = provenance,
+                     .member_provenance = own};
   const Result<std::vector<ValueShape>> shapes = infer_shapes(p.network, true);
   if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
   if (p.members.empty() || own.size() != p.size())
-    return Status(StatusCode::kInvalidArgument, "population.members: none, or not one provenance each");
+    return Status(StatusCode::kInvalidArgument,
+                  "population.members: none, or not one provenance each");
   uint32_t weights = 0, rows = 0, convolutions = 0;
   for (const Layer& layer : p.network.layers) {
     weights += static_cast<uint32_t>(layer.weights.size());
@@ -153,7 +173,9 @@ Result<PackageParts> take_apart(const Population& population, const Budget& budg
   PartList list(parts.blobs);
   add_float_weights("initial", p.network, *shapes, list);
   const auto members = p.size();
-  const auto row_of = [&](const auto& array) { return static_cast<uint32_t>(array.size() / members); };
+  const auto row_of = [&](const auto& array) {
+    return static_cast<uint32_t>(array.size() / members);
+  };
   if (!p.shape.empty()) list.add("population.shape", p.shape, {row_of(p.shape)}, members);
   list.add("population.bias", p.bias, {rows}, members);
   if (p.coding == DifferenceCoding::kInt8) {
@@ -168,22 +190,29 @@ Result<PackageParts> take_apart(const Population& population, const Budget& budg
     list.add("pose.mean", p.pose_mean, {features}, members);
     list.add("pose.factor", p.pose_factor, {features * (features + 1) / 2}, members);
   }
-  if (!p.golden_poses.empty()) list.add("golden.rotations", p.golden_poses, {row_of(p.golden_poses) / 4, 4}, members);
+  if (!p.golden_poses.empty())
+    list.add("golden.rotations", p.golden_poses, {row_of(p.golden_poses) / 4, 4}, members);
   if (!list.status().ok()) return list.status();
   return parts;
 }
 
-Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget, const Provenance& provenance) {
-  PackageParts parts{.kind = PackageKind::kSampler, .content = &sampler, .budget = budget, .provenance = provenance};
+Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget,
+                                const Provenance& provenance) {
+  PackageParts parts{.kind = PackageKind::kSampler,
+                     .content = &sampler,
+                     .budget = budget,
+                     .provenance = provenance};
   const Result<std::vector<ValueShape>> shapes = infer_shapes(sampler.network, false);
   if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
   const std::vector<size_t> tokens = sampler_token_sizes(sampler);
   if (sampler.ranks.size() != tokens.size()) {
-    return Status(StatusCode::kInvalidArgument, "sampler.ranks: has " + std::to_string(sampler.ranks.size()) + " entries for " +
-                                                    std::to_string(tokens.size()) + " tokens");
+    return Status(StatusCode::kInvalidArgument,
+                  "sampler.ranks: has " + std::to_string(sampler.ranks.size()) + " entries for " +
+                      std::to_string(tokens.size()) + " tokens");
   }
   if (sampler.denoiser.blocks > kMaxDenoiserBlocks) {
-    return Status(StatusCode::kInvalidArgument, "sampler.denoiser.blocks: is above " + std::to_string(kMaxDenoiserBlocks));
+    return Status(StatusCode::kInvalidArgument,
+                  "sampler.denoiser.blocks: is above " + std::to_string(kMaxDenoiserBlocks));
   }
   size_t values = 0, directions = 0, direction_bytes = 0, rows = 0, matrix_bytes = 0;
   for (size_t token = 0; token < tokens.size(); ++token) {
@@ -207,7 +236,8 @@ Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget, co
   list.add("denoiser.norm", sampler.norm, {2, d}, size_t{2} * sampler.denoiser.blocks + 1);
   add_pose_statistics(sampler.pose_statistics, list);
   list.add("golden.rotations", sampler.golden.rotations, {4});
-  list.add("sampler.report", std::span(reinterpret_cast<const uint8_t*>(sampler.report.data()), sampler.report.size()));
+  list.add("sampler.report", std::span(reinterpret_cast<const uint8_t*>(sampler.report.data()),
+                                       sampler.report.size()));
   if (!list.status().ok()) return list.status();
   return parts;
 }

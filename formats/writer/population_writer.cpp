@@ -19,39 +19,47 @@ Status mismatch(const NewMember& member, const std::string& what) {
 
 bool same_shape(const Network& a, const Network& b) {
   const auto same = [](const Layer& x, const Layer& y) {
-    return x.op == y.op && x.inputs[0] == y.inputs[0] && x.inputs[1] == y.inputs[1] && x.out_channels == y.out_channels &&
-           x.kernel == y.kernel && x.relu == y.relu;
+    return x.op == y.op && x.inputs[0] == y.inputs[0] && x.inputs[1] == y.inputs[1] &&
+           x.out_channels == y.out_channels && x.kernel == y.kernel && x.relu == y.relu;
   };
-  return a.input_size == b.input_size && a.input_channels == b.input_channels && std::ranges::equal(a.layers, b.layers, same);
+  return a.input_size == b.input_size && a.input_channels == b.input_channels &&
+         std::ranges::equal(a.layers, b.layers, same);
 }
 
 Status check_alike(const NewMember& member, const NewPopulation& population) {
   const Avatar &own = *member.avatar, &first = *population.members.front().avatar;
   const std::string of_first = ", '" + first.name + "' has ";
-  if (!own.holds(Precision::kFloat32)) return mismatch(member, "holds no float weights (figurine-train pack --precision f32)");
+  if (!own.holds(Precision::kFloat32))
+    return mismatch(member, "holds no float weights (figurine-train pack --precision f32)");
   if (own.body_hash != first.body_hash) {
-    return mismatch(member, "was made for the body '" + own.body_name + "' " + format_hash(own.body_hash) + of_first + "'" +
-                                first.body_name + "' " + format_hash(first.body_hash));
+    return mismatch(member, "was made for the body '" + own.body_name + "' " +
+                                format_hash(own.body_hash) + of_first + "'" + first.body_name +
+                                "' " + format_hash(first.body_hash));
   }
   if (!same_shape(own.network, population.initial)) {
-    return mismatch(member, "its network has another shape than the initial weights (" + std::to_string(count_parameters(own.network)) +
-                                " parameters, not " + std::to_string(count_parameters(population.initial)) + ")");
+    return mismatch(member, "its network has another shape than the initial weights (" +
+                                std::to_string(count_parameters(own.network)) +
+                                " parameters, not " +
+                                std::to_string(count_parameters(population.initial)) + ")");
   }
-  if (own.template_mode != first.template_mode) return mismatch(member, "has its Gaussians on another template than '" + first.name + "'");
+  if (own.template_mode != first.template_mode)
+    return mismatch(member, "has its Gaussians on another template than '" + first.name + "'");
   if (own.fourier_octaves != first.fourier_octaves) {
-    return mismatch(member,
-                    "has " + std::to_string(own.fourier_octaves) + " Fourier octaves" + of_first + std::to_string(first.fourier_octaves));
+    return mismatch(member, "has " + std::to_string(own.fourier_octaves) + " Fourier octaves" +
+                                of_first + std::to_string(first.fourier_octaves));
   }
   if (own.shape.size() != first.shape.size()) {
-    return mismatch(member,
-                    "has " + std::to_string(own.shape.size()) + " shape coefficients" + of_first + std::to_string(first.shape.size()));
+    return mismatch(member, "has " + std::to_string(own.shape.size()) + " shape coefficients" +
+                                of_first + std::to_string(first.shape.size()));
   }
   if (own.pose_statistics.joints != first.pose_statistics.joints) {
-    return mismatch(member, "its pose statistics list other joints than those of '" + first.name + "'");
+    return mismatch(member,
+                    "its pose statistics list other joints than those of '" + first.name + "'");
   }
   if (own.golden.rotations.size() != first.golden.rotations.size()) {
-    return mismatch(member, "its golden pose has " + std::to_string(own.golden.rotations.size() / 4) + " joints" + of_first +
-                                std::to_string(first.golden.rotations.size() / 4));
+    return mismatch(member, "its golden pose has " +
+                                std::to_string(own.golden.rotations.size() / 4) + " joints" +
+                                of_first + std::to_string(first.golden.rotations.size() / 4));
   }
   return {};
 }
@@ -71,12 +79,16 @@ void append(std::vector<T>& to, std::span<const T> values) {
 }
 
 // Differences of one output channel in integers, the largest as `levels`; returns the scale.
-float quantise_row(std::span<const float> weights, std::span<const float> initial, uint32_t levels, std::vector<int8_t>& out) {
+float quantise_row(std::span<const float> weights, std::span<const float> initial, uint32_t levels,
+                   std::vector<int8_t>& out) {
   float largest = 0;
-  for (size_t k = 0; k < weights.size(); ++k) largest = std::max(largest, std::fabs(weights[k] - initial[k]));
-  const float most = static_cast<float>(levels), scale = std::max(largest / most, std::numeric_limits<float>::min());
+  for (size_t k = 0; k < weights.size(); ++k)
+    largest = std::max(largest, std::fabs(weights[k] - initial[k]));
+  const float most = static_cast<float>(levels),
+              scale = std::max(largest / most, std::numeric_limits<float>::min());
   for (size_t k = 0; k < weights.size(); ++k) {
-    out.push_back(static_cast<int8_t>(clamp_and_round((weights[k] - initial[k]) / scale, -most, most)));
+    out.push_back(
+        static_cast<int8_t>(clamp_and_round((weights[k] - initial[k]) / scale, -most, most)));
   }
   return scale;
 }
@@ -84,15 +96,18 @@ float quantise_row(std::span<const float> weights, std::span<const float> initia
 // [C] of one member's integers, in the order of the convolutions.
 using Kernels = std::vector<std::vector<int8_t>>;
 
-Kernels quantise(const Avatar& avatar, const Network& initial, uint32_t levels, std::vector<float>& scales) {
+Kernels quantise(const Avatar& avatar, const Network& initial, uint32_t levels,
+                 std::vector<float>& scales) {
   Kernels kernels;
   for (size_t i = 0; i < initial.layers.size(); ++i) {
     if (initial.layers[i].op != LayerOp::kConv2d) continue;
-    const std::span<const float> weights = avatar.network.layers[i].weights, start = initial.layers[i].weights;
+    const std::span<const float> weights = avatar.network.layers[i].weights,
+                                 start = initial.layers[i].weights;
     const size_t rows = initial.layers[i].out_channels, row = weights.size() / rows;
     std::vector<int8_t>& kernel = kernels.emplace_back();
     for (size_t o = 0; o < rows; ++o) {
-      scales.push_back(quantise_row(weights.subspan(o * row, row), start.subspan(o * row, row), levels, kernel));
+      scales.push_back(
+          quantise_row(weights.subspan(o * row, row), start.subspan(o * row, row), levels, kernel));
     }
   }
   return kernels;
@@ -125,16 +140,19 @@ Status encode(const std::vector<Kernels>& members, Storage& storage) {
 Status add_halves(const NewMember& member, const Network& initial, std::vector<Half>& out) {
   for (size_t i = 0; i < initial.layers.size(); ++i) {
     for (size_t k = 0; k < initial.layers[i].weights.size(); ++k) {
-      out.push_back(to_half(member.avatar->network.layers[i].weights[k] - initial.layers[i].weights[k]));
+      out.push_back(
+          to_half(member.avatar->network.layers[i].weights[k] - initial.layers[i].weights[k]));
       if (is_finite(out.back())) continue;
-      return Status(StatusCode::kLimitExceeded,
-                    "member '" + member.avatar->name + "': layer " + std::to_string(i) + ": a difference is too large for 16 bits");
+      return Status(StatusCode::kLimitExceeded, "member '" + member.avatar->name + "': layer " +
+                                                    std::to_string(i) +
+                                                    ": a difference is too large for 16 bits");
     }
   }
   return {};
 }
 
-// The lower triangle L of a positive definite matrix = L L^T (Cholesky), rows one after the other, rounded to halves.
+// The lower triangle L of a positive definite matrix = L L^T (Cholesky), rows one after the other,
+// rounded to halves.
 void add_factor(std::span<const float> matrix, size_t n, std::vector<Half>& out) {
   std::vector<double> lower(n * n, 0.0);
   for (size_t i = 0; i < n; ++i) {
@@ -147,12 +165,15 @@ void add_factor(std::span<const float> matrix, size_t n, std::vector<Half>& out)
   }
 }
 
-// ---- Provenance: what all members have is said once ------------------------------------------------------------------------------------
+// ---- Provenance: what all members have is said once
+// ------------------------------------------------------------------------------------
 
 // Removes from every member what all have, and returns that.
 Provenance factor_out(std::vector<Provenance>& own) {
   Provenance shared;
-  const auto all = [&](const auto& member_has) { return std::all_of(own.begin(), own.end(), member_has); };
+  const auto all = [&](const auto& member_has) {
+    return std::all_of(own.begin(), own.end(), member_has);
+  };
   for (std::string Provenance::* text : kProvenanceTexts) {
     const std::string common = own.front().*text;
     if (!all([&](const Provenance& member) { return member.*text == common; })) continue;
@@ -162,13 +183,17 @@ Provenance factor_out(std::vector<Provenance>& own) {
   const auto factor_list = [&](auto list, const auto& same) {
     for (const auto& entry : std::vector(own.front().*list)) {
       const auto is_it = [&](const auto& other) { return same(entry, other); };
-      if (!all([&](const Provenance& member) { return std::ranges::any_of(member.*list, is_it); })) continue;
+      if (!all([&](const Provenance& member) { return std::ranges::any_of(member.*list, is_it); }))
+        continue;
       (shared.*list).push_back(entry);
       for (Provenance& member : own) std::erase_if(member.*list, is_it);
     }
   };
-  factor_list(&Provenance::settings, [](const KeyValue& a, const KeyValue& b) { return a.key == b.key && a.value == b.value; });
-  factor_list(&Provenance::sources, [](const std::string& a, const std::string& b) { return a == b; });
+  factor_list(&Provenance::settings, [](const KeyValue& a, const KeyValue& b) {
+    return a.key == b.key && a.value == b.value;
+  });
+  factor_list(&Provenance::sources,
+              [](const std::string& a, const std::string& b) { return a == b; });
   const std::vector<std::string> authors = own.front().authors;
   if (all([&](const Provenance& member) { return member.authors == authors; })) {
     shared.authors = authors;
@@ -181,7 +206,8 @@ Provenance factor_out(std::vector<Provenance>& own) {
 void take_quality(const NewPopulation& from, Population& to) {
   for (const NewMember& member : from.members) {
     for (const QualityMetric& metric : member.provenance->quality) {
-      if (std::ranges::find(to.quality_names, metric.name) == to.quality_names.end()) to.quality_names.push_back(metric.name);
+      if (std::ranges::find(to.quality_names, metric.name) == to.quality_names.end())
+        to.quality_names.push_back(metric.name);
     }
   }
   for (size_t m = 0; m < from.members.size(); ++m) {
@@ -194,16 +220,22 @@ void take_quality(const NewPopulation& from, Population& to) {
 }
 
 Status check(const NewPopulation& population) {
-  if (population.members.empty()) return Status(StatusCode::kInvalidArgument, "population: has no members");
+  if (population.members.empty())
+    return Status(StatusCode::kInvalidArgument, "population: has no members");
   if (population.members.size() > kMaxMembers) {
-    return Status(StatusCode::kLimitExceeded, "population: has more than " + std::to_string(kMaxMembers) + " members");
+    return Status(StatusCode::kLimitExceeded,
+                  "population: has more than " + std::to_string(kMaxMembers) + " members");
   }
   if (population.levels < 1 || population.levels > kMostLevels) {
-    return Status(StatusCode::kInvalidArgument, "population: levels " + std::to_string(population.levels) + " are none of 1 to 127");
+    return Status(
+        StatusCode::kInvalidArgument,
+        "population: levels " + std::to_string(population.levels) + " are none of 1 to 127");
   }
   const Result<std::vector<ValueShape>> shapes = infer_shapes(population.initial, true);
-  if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, "initial weights: " + shapes.status().message());
-  for (const NewMember& member : population.members) FIG_RETURN_IF_ERROR(check_alike(member, population));
+  if (!shapes.ok())
+    return Status(StatusCode::kInvalidArgument, "initial weights: " + shapes.status().message());
+  for (const NewMember& member : population.members)
+    FIG_RETURN_IF_ERROR(check_alike(member, population));
   return {};
 }
 
@@ -226,8 +258,8 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
   std::vector<Provenance> own;
   for (const NewMember& member : from.members) {
     const Avatar& avatar = *member.avatar;
-    PopulationMember& described =
-        to.members.emplace_back(PopulationMember{avatar.name, member.split, avatar.map_statistics, avatar.decoding, avatar.golden, {}});
+    PopulationMember& described = to.members.emplace_back(PopulationMember{
+        avatar.name, member.split, avatar.map_statistics, avatar.decoding, avatar.golden, {}});
     described.golden.png = {};
     described.golden.fixed_point_hash = {0, 0};
     described.golden.fixed_point_library.clear();
@@ -242,7 +274,8 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
       FIG_RETURN_IF_ERROR(add_halves(member, from.initial, storage.difference));
     }
     own.push_back(*member.provenance);
-    if (from.progress && !from.progress(to.size())) return Status(StatusCode::kInterrupted, "population: interrupted, nothing was written");
+    if (from.progress && !from.progress(to.size()))
+      return Status(StatusCode::kInterrupted, "population: interrupted, nothing was written");
   }
   if (from.coding == DifferenceCoding::kInt8) FIG_RETURN_IF_ERROR(encode(kernels, storage));
   take_quality(from, to);

@@ -1,4 +1,5 @@
-// Avatars as one population package: what they share is stated once, their weights become differences to common initial weights.
+// Avatars as one population package: what they share is stated once, their weights become
+// differences to common initial weights.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,8 @@ namespace figurine {
 inline constexpr uint32_t kMostLevels = 127;  // of either sign, beside zero
 
 struct NewMember {
-  const Avatar* avatar = nullptr;          // float weights; no picture and no hash of its golden frame is taken over
+  const Avatar* avatar =
+      nullptr;  // float weights; no picture and no hash of its golden frame is taken over
   const Provenance* provenance = nullptr;  // quality included
   Split split = Split::kTrain;
 };
@@ -23,7 +25,8 @@ struct NewPopulation {
   std::string name;
   Network initial;  // with weights
   DifferenceCoding coding = DifferenceCoding::kInt8;
-  uint32_t levels = kMostLevels;  // of kInt8: fewer are coarser and take less, log2(127 / levels) bits a weight
+  uint32_t levels =
+      kMostLevels;  // of kInt8: fewer are coarser and take less, log2(127 / levels) bits a weight
   std::vector<NewMember> members;
   Budget budget;
   std::vector<KeyValue> settings;  // of the population itself, behind those that all members share
@@ -31,10 +34,12 @@ struct NewPopulation {
   std::function<bool(size_t done)> progress;
 };
 
-// kMismatch "member 'NAME': ..." if a member has another network shape, body, template, number of shape coefficients or of joints than the
-// first, or is nothing but fixed point; kLimitExceeded if a difference does not fit. The bytes are opened again before they are returned.
+// kMismatch "member 'NAME': ..." if a member has another network shape, body, template, number of
+// shape coefficients or of joints than the first, or is nothing but fixed point; kLimitExceeded if
+// a difference does not fit. The bytes are opened again before they are returned.
 //
-//   kInt8: scale = max |w - w0| / levels over an output channel's kernel, q = round((w - w0) / scale), to nearest, ties to even
+//   kInt8: scale = max |w - w0| / levels over an output channel's kernel, q = round((w - w0) /
+//   scale), to nearest, ties to even
 Result<std::vector<std::byte>> write_population(const NewPopulation& population);
 
 }  // namespace figurine

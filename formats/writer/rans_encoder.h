@@ -10,7 +10,8 @@
 
 namespace figurine {
 
-// Frequencies of sum kRansTotal in proportion to the counts, at least 1 for every value that occurs; of nothing at all, those of zeros.
+// Frequencies of sum kRansTotal in proportion to the counts, at least 1 for every value that
+// occurs; of nothing at all, those of zeros.
 std::array<int16_t, kRansValues> normalise_counts(std::span<const uint64_t> counts);
 
 // A stretch of values that share a table. values: [-127, 127], each of a frequency above 0.

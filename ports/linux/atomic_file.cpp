@@ -25,9 +25,11 @@ Result<AtomicFile> AtomicFile::create(const std::string& path) {
   }
   const std::filesystem::path place(path);
   if (!place.has_filename()) return Status(StatusCode::kInvalidArgument, path + ": names no file");
-  const std::string hidden = "." + place.filename().string() + "." + std::to_string(::getpid()) + "." + std::to_string(counter++) + ".tmp";
+  const std::string hidden = "." + place.filename().string() + "." + std::to_string(::getpid()) +
+                             "." + std::to_string(counter++) + ".tmp";
   result.temporary_path_ = (place.parent_path() / hidden).string();
-  const int descriptor = ::open(result.temporary_path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  const int descriptor =
+      ::open(result.temporary_path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (descriptor < 0) {
     const Status status = result.error("cannot be written", errno);
     result.temporary_path_.clear();
@@ -43,7 +45,9 @@ Result<AtomicFile> AtomicFile::create(const std::string& path) {
 }
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
-    : path_(std::move(other.path_)), temporary_path_(std::move(other.temporary_path_)), file_(other.file_) {
+    : path_(std::move(other.path_)),
+      temporary_path_(std::move(other.temporary_path_)),
+      file_(other.file_) {
   other.temporary_path_.clear();
   other.file_ = nullptr;
 }
@@ -55,7 +59,8 @@ AtomicFile::~AtomicFile() {
 
 Status AtomicFile::write(std::span<const std::byte> bytes) {
   FIG_CHECK(file_ != nullptr, "write after finish");
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) return error("write failed", errno);
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size())
+    return error("write failed", errno);
   return {};
 }
 
@@ -74,7 +79,8 @@ Status AtomicFile::finish() {
 Status AtomicFile::commit() {
   FIG_CHECK(!temporary_path_.empty(), "commit twice");
   FIG_RETURN_IF_ERROR(finish());
-  if (std::rename(temporary_path_.c_str(), path_.c_str()) != 0) return error("cannot be renamed into place", errno);
+  if (std::rename(temporary_path_.c_str(), path_.c_str()) != 0)
+    return error("cannot be renamed into place", errno);
   temporary_path_.clear();
   return {};
 }

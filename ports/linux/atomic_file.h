@@ -1,5 +1,6 @@
-// A file that is written piece by piece and appears whole or not at all: a temporary beside its place, renamed by commit(), removed by the
-// destructor. For content that comes as a stream (video) or must appear together with other files (image sequences); one buffer of bytes:
+// A file that is written piece by piece and appears whole or not at all: a temporary beside its
+// place, renamed by commit(), removed by the destructor. For content that comes as a stream (video)
+// or must appear together with other files (image sequences); one buffer of bytes:
 // write_file_atomically.
 #pragma once
 
@@ -14,15 +15,16 @@ namespace figurine::ports {
 
 class AtomicFile {
  public:
-  // Creates the temporary, in the folder of path. kIo names path and the system's reason. kUnsupported if path is there and no regular
-  // file.
+  // Creates the temporary, in the folder of path. kIo names path and the system's reason.
+  // kUnsupported if path is there and no regular file.
   static Result<AtomicFile> create(const std::string& path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&&) = delete;
   ~AtomicFile();
 
   Status write(std::span<const std::byte> bytes);
-  // Flushes, syncs and closes: after this only the name is temporary. Optional; commit() does it first.
+  // Flushes, syncs and closes: after this only the name is temporary. Optional; commit() does it
+  // first.
   Status finish();
   // Gives the file its name. Call once.
   Status commit();

@@ -1,5 +1,5 @@
-// Files on Linux: memory maps for reading, write-to-temporary + fsync + rename for writing. Every error names the path and the system's
-// reason.
+// Files on Linux: memory maps for reading, write-to-temporary + fsync + rename for writing. Every
+// error names the path and the system's reason.
 #include "ports/linux/files.h"
 
 #include <fcntl.h>
@@ -49,7 +49,8 @@ std::string parent_of(const std::string& path) {
 // All of bytes, through interruptions and short writes. Returns 0 or errno.
 int write_all(int fd, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
-    const ssize_t written = ::write(fd, bytes.data(), std::min<size_t>(bytes.size(), size_t{1} << 30));
+    const ssize_t written =
+        ::write(fd, bytes.data(), std::min<size_t>(bytes.size(), size_t{1} << 30));
     if (written < 0) {
       if (errno == EINTR) continue;
       return errno;
@@ -74,7 +75,8 @@ Result<MappedFile> MappedFile::open(const std::string& path) {
   struct stat info;
   if (::fstat(file.get(), &info) != 0) return system_error(path, "cannot open", errno);
   if (S_ISDIR(info.st_mode)) return system_error(path, "cannot read", EISDIR);
-  if (!S_ISREG(info.st_mode)) return Status(StatusCode::kIo, path + ": cannot map: not a regular file");
+  if (!S_ISREG(info.st_mode))
+    return Status(StatusCode::kIo, path + ": cannot map: not a regular file");
 
   MappedFile mapped;
   if (info.st_size > 0) {
@@ -98,11 +100,13 @@ MappedFile::~MappedFile() {
 }
 
 Status write_file_atomically(const std::string& path, std::span<const std::byte> bytes) {
-  // rename() would say "Is a directory" only after everything was written, and would replace a device node by a file.
+  // rename() would say "Is a directory" only after everything was written, and would replace a
+  // device node by a file.
   struct stat info;
   if (::stat(path.c_str(), &info) == 0 && !S_ISREG(info.st_mode)) {
-    return S_ISDIR(info.st_mode) ? system_error(path, "cannot write", EISDIR)
-                                 : Status(StatusCode::kIo, path + ": cannot write: not a regular file");
+    return S_ISDIR(info.st_mode)
+               ? system_error(path, "cannot write", EISDIR)
+               : Status(StatusCode::kIo, path + ": cannot write: not a regular file");
   }
 
   std::string temporary = path + ".XXXXXX";
@@ -119,9 +123,11 @@ Status write_file_atomically(const std::string& path, std::span<const std::byte>
     return system_error(path, "cannot write", error);
   }
 
-  // The new name is on disk once its folder is. Some file systems cannot sync folders (EINVAL): the file is complete either way.
+  // The new name is on disk once its folder is. Some file systems cannot sync folders (EINVAL): the
+  // file is complete either way.
   const Descriptor folder(::open(parent_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder.get() >= 0 && ::fsync(folder.get()) != 0 && errno != EINVAL) return system_error(path, "cannot sync the folder", errno);
+  if (folder.get() >= 0 && ::fsync(folder.get()) != 0 && errno != EINVAL)
+    return system_error(path, "cannot sync the folder", errno);
   return Status();
 }
 

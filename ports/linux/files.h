@@ -24,8 +24,8 @@ class MappedFile {
   std::span<const std::byte> bytes_;
 };
 
-// The file appears whole or not at all: written beside its place, synced, renamed. Errors name path and the system's reason; the temporary
-// is removed.
+// The file appears whole or not at all: written beside its place, synced, renamed. Errors name path
+// and the system's reason; the temporary is removed.
 Status write_file_atomically(const std::string& path, std::span<const std::byte> bytes);
 
 }  // namespace figurine::ports

@@ -13,7 +13,9 @@ namespace figurine::ports {
 Result<FolderLock> FolderLock::acquire(const std::string& folder) {
   // Not inherited by programs that are started: the lock would outlive its process in them.
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return Status(StatusCode::kIo, folder + ": cannot be opened: " + std::generic_category().message(errno));
+  if (fd < 0)
+    return Status(StatusCode::kIo,
+                  folder + ": cannot be opened: " + std::generic_category().message(errno));
   FolderLock lock(fd);
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     return Status(StatusCode::kIo, folder + ": another process is at work in it");

@@ -1,5 +1,5 @@
-// One process at a time works in a folder. The lock is on the folder itself and leaves nothing behind: the system takes it back when the
-// process ends, however it ends.
+// One process at a time works in a folder. The lock is on the folder itself and leaves nothing
+// behind: the system takes it back when the process ends, however it ends.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@ namespace figurine::ports {
 
 class FolderLock {
  public:
-  // The folder must exist. kIo, naming it, if another lock holds it, in this process or in another one. File systems without locks (some
-  // network ones) give one that holds nobody off.
+  // The folder must exist. kIo, naming it, if another lock holds it, in this process or in another
+  // one. File systems without locks (some network ones) give one that holds nobody off.
   static Result<FolderLock> acquire(const std::string& folder);
   FolderLock(FolderLock&& other) noexcept;
   FolderLock& operator=(FolderLock&& other) noexcept;

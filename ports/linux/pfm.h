@@ -1,8 +1,9 @@
 // PFM, the portable float map: float32 images without loss, for comparing renderers.
 //
-// Header "Pf" (grey), "PF" (RGB) or "PF4" (RGBA), a newline, "WIDTH HEIGHT", a newline, the scale "-1.0" (its sign says little-endian), a
-// newline, then rows from the bottom up. "PF4" is the four-channel extension that ImageMagick and others read; the original format knows
-// grey and RGB alone.
+// Header "Pf" (grey), "PF" (RGB) or "PF4" (RGBA), a newline, "WIDTH HEIGHT", a newline, the scale
+// "-1.0" (its sign says little-endian), a newline, then rows from the bottom up. "PF4" is the
+// four-channel extension that ImageMagick and others read; the original format knows grey and RGB
+// alone.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
-// PNG, 8 bits a channel, through libpng's simplified interface: bytes in memory, no files (ports/linux/files.h writes them atomically).
+// PNG, 8 bits a channel, through libpng's simplified interface: bytes in memory, no files
+// (ports/linux/files.h writes them atomically).
 #pragma once
 
 #include <cstddef>
@@ -11,12 +12,12 @@
 
 namespace figurine::ports {
 
-// Grey, RGB or RGBA by the image's channels; marked as sRGB. The same pixels give the same bytes. kInvalidArgument if the image is not
-// sound.
+// Grey, RGB or RGBA by the image's channels; marked as sRGB. The same pixels give the same bytes.
+// kInvalidArgument if the image is not sound.
 Result<std::vector<std::byte>> encode_png(const ImageU8& image);
 
-// Any PNG, brought to 8 bits: grey stays 1 channel, colour 3, anything with alpha becomes 4. name appears in messages. kCorrupt on broken
-// bytes, kLimitExceeded beyond 16384 pixels a side.
+// Any PNG, brought to 8 bits: grey stays 1 channel, colour 3, anything with alpha becomes 4. name
+// appears in messages. kCorrupt on broken bytes, kLimitExceeded beyond 16384 pixels a side.
 Result<ImageU8> decode_png(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace figurine::ports

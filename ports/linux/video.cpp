@@ -39,11 +39,13 @@ class Y4mWriter : public VideoWriter {
   std::vector<std::byte> buffer_;
 };
 
-// Frames go to ffmpeg through a pipe; it writes the temporary of an AtomicFile. Its own process group keeps the terminal's interrupt from
-// it, so that we decide what remains; its messages go to an unnamed file, so that neither side can block on them.
+// Frames go to ffmpeg through a pipe; it writes the temporary of an AtomicFile. Its own process
+// group keeps the terminal's interrupt from it, so that we decide what remains; its messages go to
+// an unnamed file, so that neither side can block on them.
 class FfmpegWriter : public VideoWriter {
  public:
-  FfmpegWriter(AtomicFile file, const Options& options) : file_(std::move(file)), options_(options) {}
+  FfmpegWriter(AtomicFile file, const Options& options)
+      : file_(std::move(file)), options_(options) {}
   ~FfmpegWriter() override {
     close_pipe();
     if (process_ > 0) {
@@ -55,14 +57,19 @@ class FfmpegWriter : public VideoWriter {
 
   Status start() {
     int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0) return Status(StatusCode::kIo, std::string("ffmpeg: pipe: ") + std::strerror(errno));
+    if (::pipe2(ends, O_CLOEXEC) != 0)
+      return Status(StatusCode::kIo, std::string("ffmpeg: pipe: ") + std::strerror(errno));
     pipe_ = ends[1];
     messages_ = ::memfd_create("ffmpeg-messages", MFD_CLOEXEC);
-    const std::string size = std::to_string(options_.width_px) + "x" + std::to_string(options_.height_px);
-    const std::string rate = std::to_string(options_.rate.numerator) + "/" + std::to_string(options_.rate.denominator);
-    // Players want 4:2:0, which wants even sizes: an odd last row or column is repeated by the padding filter's neighbour, the scaler.
+    const std::string size =
+        std::to_string(options_.width_px) + "x" + std::to_string(options_.height_px);
+    const std::string rate =
+        std::to_string(options_.rate.numerator) + "/" + std::to_string(options_.rate.denominator);
+    // Players want 4:2:0, which wants even sizes: an odd last row or column is repeated by the
+    // padding filter's neighbour, the scaler.
     const std::string filter =
-        "scale=ceil(iw/2)*2:ceil(ih/2)*2:flags=accurate_rnd+full_chroma_int:in_range=full:out_range=tv:out_color_matrix=bt709";
+        "scale=ceil(iw/2)*2:ceil(ih/"
+        "2)*2:flags=accurate_rnd+full_chroma_int:in_range=full:out_range=tv:out_color_matrix=bt709";
     std::vector<std::string> words = {"ffmpeg",
                                       "-hide_banner",
                                       "-loglevel",
@@ -114,14 +121,17 @@ class FfmpegWriter : public VideoWriter {
     posix_spawnattr_init(&attributes);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
     posix_spawnattr_setpgroup(&attributes, 0);
-    const int code = ::posix_spawnp(&process_, "ffmpeg", &actions, &attributes, arguments.data(), environ);
+    const int code =
+        ::posix_spawnp(&process_, "ffmpeg", &actions, &attributes, arguments.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     posix_spawnattr_destroy(&attributes);
     ::close(ends[0]);
     if (code == 0) return {};
     process_ = -1;
     if (code == ENOENT) {
-      return Status(StatusCode::kUnsupported, file_.path() + ": .mp4 needs ffmpeg, which is not installed; write a .y4m instead");
+      return Status(
+          StatusCode::kUnsupported,
+          file_.path() + ": .mp4 needs ffmpeg, which is not installed; write a .y4m instead");
     }
     return Status(StatusCode::kIo, std::string("ffmpeg: ") + std::strerror(code));
   }
@@ -132,7 +142,8 @@ class FfmpegWriter : public VideoWriter {
     while (left > 0) {
       const ssize_t written = ::write(pipe_, data, left);
       if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) return reap();  // EPIPE: ffmpeg has ended, it says why (callers ignore SIGPIPE)
+      if (written <= 0)
+        return reap();  // EPIPE: ffmpeg has ended, it says why (callers ignore SIGPIPE)
       data += written;
       left -= static_cast<size_t>(written);
     }
@@ -181,13 +192,17 @@ class FfmpegWriter : public VideoWriter {
   int messages_ = -1;
 };
 
-bool ends_with(const std::string& path, std::string_view ending) { return path.size() > ending.size() && path.ends_with(ending); }
+bool ends_with(const std::string& path, std::string_view ending) {
+  return path.size() > ending.size() && path.ends_with(ending);
+}
 
 }  // namespace
 
-Result<std::unique_ptr<VideoWriter>> VideoWriter::create(const std::string& path, const Options& options) {
+Result<std::unique_ptr<VideoWriter>> VideoWriter::create(const std::string& path,
+                                                         const Options& options) {
   const bool y4m = ends_with(path, ".y4m");
-  if (!y4m && !ends_with(path, ".mp4")) return Status(StatusCode::kUnsupported, path + ": video is written as .y4m or .mp4");
+  if (!y4m && !ends_with(path, ".mp4"))
+    return Status(StatusCode::kUnsupported, path + ": video is written as .y4m or .mp4");
   Result<AtomicFile> file = AtomicFile::create(path);
   if (!file.ok()) return file.status();
   if (y4m) {

@@ -1,9 +1,11 @@
-// exp, exp2, log2, erf and the logistic function in float, of our own: glibc picks other code by CPU, and the last bits with it.
+// exp, exp2, log2, erf and the logistic function in float, of our own: glibc picks other code by
+// CPU, and the last bits with it.
 //
-// Every operation below is exactly rounded IEEE arithmetic in a fixed order, so each CPU and each vector width gives the same bits
-// (contraction is off in the whole project). Errors are relative, against the exact value, the largest over all floats of the stated range
-// (float_math_test measures them). The polynomial is minimax in relative error on [-1/2, 1/2] (Remez), with the constant term held at 1 so
-// that exp2(0) == 1.
+// Every operation below is exactly rounded IEEE arithmetic in a fixed order, so each CPU and each
+// vector width gives the same bits (contraction is off in the whole project). Errors are relative,
+// against the exact value, the largest over all floats of the stated range (float_math_test
+// measures them). The polynomial is minimax in relative error on [-1/2, 1/2] (Remez), with the
+// constant term held at 1 so that exp2(0) == 1.
 #pragma once
 
 #include <bit>
@@ -30,9 +32,12 @@ inline float round_small(float x) {
 }
 
 // 2^n for integers -126 <= n <= 127.
-inline float power_of_two(float n) { return std::bit_cast<float>((static_cast<int32_t>(n) + 127) << 23); }
+inline float power_of_two(float n) {
+  return std::bit_cast<float>((static_cast<int32_t>(n) + 127) << 23);
+}
 
-// 2^-x for x >= 0; everything above 126 counts as 126, so that no denormal appears. Not for NaN. Largest error 1.1e-7.
+// 2^-x for x >= 0; everything above 126 counts as 126, so that no denormal appears. Not for NaN.
+// Largest error 1.1e-7.
 inline float exp2_minus(float x) {
   x = x < 126.0f ? x : 126.0f;
   const float n = round_small(x);
@@ -44,12 +49,13 @@ inline float exp_float(float x) {
   if (!(x > -87.33f)) return x != x ? x : 0.0f;
   if (x > 88.722835f) return std::numeric_limits<float>::infinity();
   constexpr float kLog2E = 1.44269504f;
-  // ln 2 in two parts, the first with trailing zeros so that n * kLn2High is exact (Cody and Waite, Software Manual for the Elementary
-  // Functions, 1980).
+  // ln 2 in two parts, the first with trailing zeros so that n * kLn2High is exact (Cody and Waite,
+  // Software Manual for the Elementary Functions, 1980).
   constexpr float kLn2High = 0x1.62e4p-1f, kLn2Low = 0x1.7f7d1cp-20f;
   float n = round_small(x * kLog2E);
   const float r = (x - n * kLn2High) - n * kLn2Low;
-  // Near the top n is 128, whose power does not fit a float: half of it now, the other half at the end.
+  // Near the top n is 128, whose power does not fit a float: half of it now, the other half at the
+  // end.
   const float twice = n > 127.0f ? 2.0f : 1.0f;
   n = n > 127.0f ? 127.0f : n;
   return exp2_fraction(r * kLog2E) * power_of_two(n) * twice;
@@ -58,8 +64,8 @@ inline float exp_float(float x) {
 // 1 / (1 + e^-x): 0 for -inf, 1 for inf.
 inline float logistic(float x) { return 1.0f / (1.0f + exp_float(-x)); }
 
-// erf(x) for all finite floats, without a branch. Largest absolute error 6e-7. Abramowitz and Stegun, Handbook of Mathematical Functions,
-// 1964, 7.1.26 (1.5e-7 of its own).
+// erf(x) for all finite floats, without a branch. Largest absolute error 6e-7. Abramowitz and
+// Stegun, Handbook of Mathematical Functions, 1964, 7.1.26 (1.5e-7 of its own).
 inline float erf_float(float x) {
   const float a = x < 0.0f ? -x : x;
   const float t = 1.0f / (1.0f + 0.3275911f * a);

@@ -1,7 +1,8 @@
-// Dot products of int16 arrays to exact int32 sums: what the ends of a network in fixed point and a sampler's matrices are made of.
+// Dot products of int16 arrays to exact int32 sums: what the ends of a network in fixed point and a
+// sampler's matrices are made of.
 //
-// Integer sums are exact, so any order gives the same bits; the caller says that none overflows. Compilers make pmaddwd (SSE2) or smlal
-// (NEON) of the loop.
+// Integer sums are exact, so any order gives the same bits; the caller says that none overflows.
+// Compilers make pmaddwd (SSE2) or smlal (NEON) of the loop.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +11,13 @@
 
 namespace figurine {
 
-inline constexpr size_t kDotsAtOnce = 4;   // sums of one pass: enough to hide the loads, few enough for 16 registers
+inline constexpr size_t kDotsAtOnce =
+    4;  // sums of one pass: enough to hide the loads, few enough for 16 registers
 inline constexpr size_t kDotMultiple = 8;  // lengths are multiples of it, padded by zeros
 
 // sums[i] += shared . rows[i] for four rows that lie `length` apart. All aligned to 16 bytes.
-inline void add_four_dots(const int16_t* __restrict shared, const int16_t* __restrict rows, size_t length, int32_t* __restrict sums) {
+inline void add_four_dots(const int16_t* __restrict shared, const int16_t* __restrict rows,
+                          size_t length, int32_t* __restrict sums) {
   shared = std::assume_aligned<16>(shared);
   rows = std::assume_aligned<16>(rows);
   const int16_t *r0 = rows, *r1 = r0 + length, *r2 = r1 + length, *r3 = r2 + length;

@@ -1,6 +1,8 @@
-// Memory that can say no: aligned, padded buffers that only ever grow, so that a frame allocates nothing once its buffers have their size.
+// Memory that can say no: aligned, padded buffers that only ever grow, so that a frame allocates
+// nothing once its buffers have their size.
 //
-// std::vector would throw on failure; here ensure() returns false and the caller answers with kOutOfMemory.
+// std::vector would throw on failure; here ensure() returns false and the caller answers with
+// kOutOfMemory.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +21,8 @@
 namespace figurine {
 
 inline constexpr size_t kBufferAlignment = 64;
-inline constexpr size_t kBufferPadding = 64;  // addressable bytes behind the last element: XNNPACK and vector loads read past the end
+inline constexpr size_t kBufferPadding =
+    64;  // addressable bytes behind the last element: XNNPACK and vector loads read past the end
 
 template <class T>
 class Buffer {
@@ -27,7 +30,8 @@ class Buffer {
 
  public:
   Buffer() = default;
-  Buffer(Buffer&& other) noexcept : data_(std::exchange(other.data_, nullptr)), capacity_(std::exchange(other.capacity_, 0)) {}
+  Buffer(Buffer&& other) noexcept
+      : data_(std::exchange(other.data_, nullptr)), capacity_(std::exchange(other.capacity_, 0)) {}
   Buffer& operator=(Buffer&& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(capacity_, other.capacity_);
@@ -35,7 +39,8 @@ class Buffer {
   }
   ~Buffer() { ::operator delete(data_, std::align_val_t(kBufferAlignment)); }
 
-  // Room for count elements. Growing loses the contents; new memory is zero. False if there is none.
+  // Room for count elements. Growing loses the contents; new memory is zero. False if there is
+  // none.
   bool ensure(size_t count) {
     if (count <= capacity_) return true;
     if (count > (std::numeric_limits<size_t>::max() - kBufferPadding) / sizeof(T)) return false;
@@ -61,13 +66,17 @@ class Buffer {
     FIG_DCHECK(count <= capacity_, "span within the buffer");
     return {data_, count};
   }
-  uint64_t memory_bytes() const { return data_ == nullptr ? 0 : capacity_ * sizeof(T) + kBufferPadding; }
+  uint64_t memory_bytes() const {
+    return data_ == nullptr ? 0 : capacity_ * sizeof(T) + kBufferPadding;
+  }
 
  private:
   T* data_ = nullptr;
   size_t capacity_ = 0;
 };
 
-inline Status out_of_memory(const char* what) { return Status(StatusCode::kOutOfMemory, std::string("no memory for ") + what); }
+inline Status out_of_memory(const char* what) {
+  return Status(StatusCode::kOutOfMemory, std::string("no memory for ") + what);
+}
 
 }  // namespace figurine

@@ -18,15 +18,17 @@ constexpr uint64_t kMaxGaussians = uint64_t(1) << 28;
 Status invalid(const std::string& what) { return Status(StatusCode::kInvalidArgument, what); }
 
 Status validate_target(const ImageTarget& target, const Camera& camera) {
-  if (target.format != PixelFormat::kRgba8 && target.format != PixelFormat::kRgbaF32) return invalid("image: unknown pixel format");
+  if (target.format != PixelFormat::kRgba8 && target.format != PixelFormat::kRgbaF32)
+    return invalid("image: unknown pixel format");
   const size_t pixel_bytes = target.format == PixelFormat::kRgba8 ? 4 : 4 * sizeof(float);
   if (target.pixels == nullptr) return invalid("image: no pixels");
   if (target.stride_bytes < pixel_bytes * camera.width_px) {
-    return invalid("image: rows of " + std::to_string(target.stride_bytes) + " bytes are too short for " + std::to_string(camera.width_px) +
-                   " pixels");
+    return invalid("image: rows of " + std::to_string(target.stride_bytes) +
+                   " bytes are too short for " + std::to_string(camera.width_px) + " pixels");
   }
   if (target.format == PixelFormat::kRgbaF32 &&
-      (target.stride_bytes % alignof(float) != 0 || reinterpret_cast<uintptr_t>(target.pixels) % alignof(float) != 0)) {
+      (target.stride_bytes % alignof(float) != 0 ||
+       reinterpret_cast<uintptr_t>(target.pixels) % alignof(float) != 0)) {
     return invalid("image: float pixels must be aligned to 4 bytes");
   }
   return {};
@@ -34,9 +36,11 @@ Status validate_target(const ImageTarget& target, const Camera& camera) {
 
 Status validate_gaussians(const GaussianView& gaussians, size_t index) {
   const std::string where = "gaussians[" + std::to_string(index) + "]: ";
-  if (gaussians.sh_degree > kMaxShDegree) return invalid(where + "SH degree " + std::to_string(gaussians.sh_degree) + " is above 3");
+  if (gaussians.sh_degree > kMaxShDegree)
+    return invalid(where + "SH degree " + std::to_string(gaussians.sh_degree) + " is above 3");
   const size_t n = gaussians.count;
-  if (gaussians.position_m.size() != 3 * n || gaussians.covariance_factor.size() != 9 * n || gaussians.opacity.size() != n ||
+  if (gaussians.position_m.size() != 3 * n || gaussians.covariance_factor.size() != 9 * n ||
+      gaussians.opacity.size() != n ||
       gaussians.sh.size() != 3 * n * sh_coefficients(gaussians.sh_degree)) {
     return invalid(where + "the arrays' sizes do not fit the count of " + std::to_string(n));
   }
@@ -72,12 +76,14 @@ const char* to_string(Stage stage) {
 const char* network_library() { return "XNNPACK " FIGURINE_XNNPACK_VERSION; }
 
 struct Renderer::Impl {
-  Impl(ThreadPool&& threads, uint64_t (*clock)()) : pool(std::move(threads)), now_ns(clock), rasterizer(pool) {}
+  Impl(ThreadPool&& threads, uint64_t (*clock)())
+      : pool(std::move(threads)), now_ns(clock), rasterizer(pool) {}
 
   Status validate(const Frame& frame, const ImageTarget& target, uint64_t& gaussian_count) const {
     FIG_RETURN_IF_ERROR(validate_camera(frame.camera));
     FIG_RETURN_IF_ERROR(validate_target(target, frame.camera));
-    if (!(frame.splat.alpha_cut > 0 && frame.splat.alpha_cut <= 0.5f)) return invalid("alpha cut: must be above 0 and at most 0.5");
+    if (!(frame.splat.alpha_cut > 0 && frame.splat.alpha_cut <= 0.5f))
+      return invalid("alpha cut: must be above 0 and at most 0.5");
     if (frame.background) {
       for (float channel : *frame.background) {
         if (!std::isfinite(channel)) return invalid("background: must be finite");
@@ -85,7 +91,8 @@ struct Renderer::Impl {
     }
     gaussian_count = 0;
     for (size_t i = 0; i < frame.avatars.size(); ++i) {
-      FIG_RETURN_IF_ERROR(validate_avatar(frame.avatars[i].avatar, frame.avatars[i].pose).within("avatars[" + std::to_string(i) + "]"));
+      FIG_RETURN_IF_ERROR(validate_avatar(frame.avatars[i].avatar, frame.avatars[i].pose)
+                              .within("avatars[" + std::to_string(i) + "]"));
       gaussian_count += avatars[static_cast<size_t>(frame.avatars[i].avatar)]->body().texel_count();
     }
     for (size_t i = 0; i < frame.gaussians.size(); ++i) {
@@ -93,8 +100,9 @@ struct Renderer::Impl {
       gaussian_count += frame.gaussians[i].count;
     }
     if (gaussian_count > kMaxGaussians) {
-      return Status(StatusCode::kLimitExceeded,
-                    "frame: " + std::to_string(gaussian_count) + " Gaussians, at most " + std::to_string(kMaxGaussians));
+      return Status(StatusCode::kLimitExceeded, "frame: " + std::to_string(gaussian_count) +
+                                                    " Gaussians, at most " +
+                                                    std::to_string(kMaxGaussians));
     }
     return {};
   }
@@ -131,20 +139,27 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
   return renderer;
 }
 
-Result<AvatarId> Renderer::add_avatar(const Package& avatar, const Package& body, std::optional<Precision> precision) {
+Result<AvatarId> Renderer::add_avatar(const Package& avatar, const Package& body,
+                                      std::optional<Precision> precision) {
   if (avatar.kind() != PackageKind::kAvatar)
-    return Status(StatusCode::kMismatch, std::string("an avatar is wanted, not a ") + to_string(avatar.kind()));
+    return Status(StatusCode::kMismatch,
+                  std::string("an avatar is wanted, not a ") + to_string(avatar.kind()));
   return add_avatar(avatar.avatar(), body, precision);
 }
 
-Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body, std::optional<Precision> precision) {
+Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
+                                      std::optional<Precision> precision) {
   if (body.kind() != PackageKind::kBody)
-    return Status(StatusCode::kMismatch, std::string("a body is wanted, not a ") + to_string(body.kind()));
+    return Status(StatusCode::kMismatch,
+                  std::string("a body is wanted, not a ") + to_string(body.kind()));
   FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar, body));
-  const Precision held = avatar.holds(Precision::kFixedPoint) ? Precision::kFixedPoint : Precision::kFloat32;
-  Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(avatar, body.body(), precision.value_or(held), impl_->pool);
+  const Precision held =
+      avatar.holds(Precision::kFixedPoint) ? Precision::kFixedPoint : Precision::kFloat32;
+  Result<std::unique_ptr<PosedAvatar>> posed =
+      PosedAvatar::create(avatar, body.body(), precision.value_or(held), impl_->pool);
   if (!posed.ok()) return posed.status();
-  if (!impl_->gaussians.ensure(body.body().texel_count(), (*posed)->sh_degree())) return out_of_memory("an avatar's Gaussians");
+  if (!impl_->gaussians.ensure(body.body().texel_count(), (*posed)->sh_degree()))
+    return out_of_memory("an avatar's Gaussians");
   impl_->avatars.push_back(std::move(posed).value());
   return AvatarId(impl_->avatars.size() - 1);
 }
@@ -158,7 +173,8 @@ Status Renderer::render(const Frame& frame, const ImageTarget& target) {
   Impl& impl = *impl_;
   uint64_t gaussian_count = 0;
   FIG_RETURN_IF_ERROR(impl.validate(frame, target, gaussian_count));
-  FIG_RETURN_IF_ERROR(impl.rasterizer.begin(frame.camera, frame.splat.alpha_cut, static_cast<uint32_t>(gaussian_count)));
+  FIG_RETURN_IF_ERROR(impl.rasterizer.begin(frame.camera, frame.splat.alpha_cut,
+                                            static_cast<uint32_t>(gaussian_count)));
 
   StageClock clock(impl.now_ns);
   FrameStatistics statistics;

@@ -13,7 +13,9 @@ class StageClock {
   explicit StageClock(uint64_t (*now_ns)()) : now_ns_(now_ns) {}
 
   uint64_t now() const { return now_ns_ == nullptr ? 0 : now_ns_(); }
-  void add(Stage stage, uint64_t duration_ns) { stage_ns_[static_cast<size_t>(stage)] += duration_ns; }
+  void add(Stage stage, uint64_t duration_ns) {
+    stage_ns_[static_cast<size_t>(stage)] += duration_ns;
+  }
   const std::array<uint64_t, kStageCount>& stage_ns() const { return stage_ns_; }
 
   // Times a scope.

@@ -1,6 +1,6 @@
-// The program's own malloc family comes before the C library's at link time; each function counts and passes on to glibc's internal name of
-// the same thing. free() stays glibc's, since all memory is. Operator new ends in malloc, so C++ and C (XNNPACK, the thread pool) are both
-// seen.
+// The program's own malloc family comes before the C library's at link time; each function counts
+// and passes on to glibc's internal name of the same thing. free() stays glibc's, since all memory
+// is. Operator new ends in malloc, so C++ and C (XNNPACK, the thread pool) are both seen.
 #include "samples/figurine/allocation_counter.h"
 
 #include <atomic>

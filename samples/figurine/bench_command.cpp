@@ -1,8 +1,9 @@
-// figurine bench: what a frame costs on this machine, stage by stage, in every precision that the package holds, on one thread and on
-// several. Every frame has a fresh pose and a run of the network.
+// figurine bench: what a frame costs on this machine, stage by stage, in every precision that the
+// package holds, on one thread and on several. Every frame has a fresh pose and a run of the
+// network.
 //
-// Precisions and thread counts take turns frame by frame, so that whatever else the machine does falls on all of them alike; medians are
-// compared, not means.
+// Precisions and thread counts take turns frame by frame, so that whatever else the machine does
+// falls on all of them alike; medians are compared, not means.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -45,12 +46,15 @@ struct Lane {
   FrameLog log;
   uint64_t allocations = 0;
 
-  std::span<const FrameAvatar> pose(uint32_t i) { return cast->moves() ? cast->pose(frames[i % frames.size()]) : cast->sway(i); }
+  std::span<const FrameAvatar> pose(uint32_t i) {
+    return cast->moves() ? cast->pose(frames[i % frames.size()]) : cast->sway(i);
+  }
   Status render(uint32_t i, RenderedFrame& frame, bool measured) {
     const std::span<const FrameAvatar> posed = pose(i);
     if (measured) start_counting_allocations();
     const uint64_t start_ns = now_ns();
-    const Status status = renderer->render({.camera = cameras[i % cameras.size()], .avatars = posed}, frame.target());
+    const Status status =
+        renderer->render({.camera = cameras[i % cameras.size()], .avatars = posed}, frame.target());
     const uint64_t total_ns = now_ns() - start_ns;
     if (measured) {
       allocations += stop_counting_allocations();
@@ -67,7 +71,8 @@ struct FirstFrame {
 double ms_since(uint64_t start_ns) { return static_cast<double>(now_ns() - start_ns) * 1e-6; }
 
 // From closed files to the first picture, by the golden pose and camera.
-Status open_lane(const BenchOptions& options, RendererOptions renderer_options, Lane& lane, FirstFrame& first) {
+Status open_lane(const BenchOptions& options, RendererOptions renderer_options, Lane& lane,
+                 FirstFrame& first) {
   uint64_t start_ns = now_ns();
   Result<Cast> cast = Cast::load(options.cast);
   if (!cast.ok()) return cast.status();
@@ -83,14 +88,16 @@ Status open_lane(const BenchOptions& options, RendererOptions renderer_options, 
   const Camera& camera = lane.cast->avatar(0).avatar.golden.camera;
   RenderedFrame frame({camera.width_px, camera.height_px}, PixelFormat::kRgba8);
   start_ns = now_ns();
-  FIG_RETURN_IF_ERROR(lane.renderer->render({.camera = camera, .avatars = lane.cast->pose(0)}, frame.target()));
+  FIG_RETURN_IF_ERROR(
+      lane.renderer->render({.camera = camera, .avatars = lane.cast->pose(0)}, frame.target()));
   first.render_ms = ms_since(start_ns);
   return {};
 }
 
 // What is asked for; otherwise all that the avatar holds, the renderer's own choice first.
 Result<std::vector<Precision>> choose_precisions(const BenchOptions& options) {
-  if (const std::optional<Precision> asked = options.device.network_precision()) return std::vector<Precision>{*asked};
+  if (const std::optional<Precision> asked = options.device.network_precision())
+    return std::vector<Precision>{*asked};
   const Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.cast.avatars[0]);
   if (!avatar.ok()) return avatar.status();
   std::vector<Precision> precisions;
@@ -101,12 +108,14 @@ Result<std::vector<Precision>> choose_precisions(const BenchOptions& options) {
 }
 
 nlohmann::ordered_json lane_json(const Lane& lane) {
-  nlohmann::ordered_json json = {{"threads", lane.threads}, {"precision", to_string(lane.precision)}};
+  nlohmann::ordered_json json = {{"threads", lane.threads},
+                                 {"precision", to_string(lane.precision)}};
   json["frames_per_second"] = 1000 / std::max(lane.log.total_ms().median, 1e-6);
   json["stages_ms"] = lane.log.stages_json();
   json["work"] = lane.log.work_json();
   json["allocations_per_frame"] =
-      can_count_allocations() ? nlohmann::ordered_json(static_cast<double>(lane.allocations) / static_cast<double>(lane.log.frames()))
+      can_count_allocations() ? nlohmann::ordered_json(static_cast<double>(lane.allocations) /
+                                                       static_cast<double>(lane.log.frames()))
                               : nullptr;
   json["renderer_memory_bytes"] = lane.renderer->memory_bytes();
   return json;
@@ -114,9 +123,11 @@ nlohmann::ordered_json lane_json(const Lane& lane) {
 
 void print_table(const nlohmann::ordered_json& json) {
   const auto& lanes = json["runs"];
-  std::printf("%s, %s\n", json["machine"]["cpu"].get<std::string>().c_str(), json["date"].get<std::string>().c_str());
-  std::printf("%u frames of %ux%u, a fresh pose each; milliseconds, median (90th percentile)\n\n", json["frames"].get<uint32_t>(),
-              json["size"][0].get<uint32_t>(), json["size"][1].get<uint32_t>());
+  std::printf("%s, %s\n", json["machine"]["cpu"].get<std::string>().c_str(),
+              json["date"].get<std::string>().c_str());
+  std::printf("%u frames of %ux%u, a fresh pose each; milliseconds, median (90th percentile)\n\n",
+              json["frames"].get<uint32_t>(), json["size"][0].get<uint32_t>(),
+              json["size"][1].get<uint32_t>());
   std::printf("%-12s", "precision");
   for (const auto& lane : lanes) std::printf("%20s", lane["precision"].get<std::string>().c_str());
   std::printf("\n%-12s", "threads");
@@ -125,26 +136,32 @@ void print_table(const nlohmann::ordered_json& json) {
   for (const auto& [stage, first] : lanes[0]["stages_ms"].items()) {
     std::printf("%-12s", stage.c_str());
     for (const auto& lane : lanes) {
-      std::printf("%11.3f (%6.3f)", lane["stages_ms"][stage]["median"].get<double>(), lane["stages_ms"][stage]["p90"].get<double>());
+      std::printf("%11.3f (%6.3f)", lane["stages_ms"][stage]["median"].get<double>(),
+                  lane["stages_ms"][stage]["p90"].get<double>());
     }
     std::printf("\n");
   }
   const auto& work = lanes[0]["work"];
-  std::printf(
-      "\nwork a frame: %.3f GMAC, %llu Gaussians, %llu visible, %llu pairs, %llu blends\n", work["macs"].get<double>() * 1e-9,
-      static_cast<unsigned long long>(work["gaussians"].get<uint64_t>()), static_cast<unsigned long long>(work["visible"].get<uint64_t>()),
-      static_cast<unsigned long long>(work["pairs"].get<uint64_t>()), static_cast<unsigned long long>(work["blends"].get<uint64_t>()));
+  std::printf("\nwork a frame: %.3f GMAC, %llu Gaussians, %llu visible, %llu pairs, %llu blends\n",
+              work["macs"].get<double>() * 1e-9,
+              static_cast<unsigned long long>(work["gaussians"].get<uint64_t>()),
+              static_cast<unsigned long long>(work["visible"].get<uint64_t>()),
+              static_cast<unsigned long long>(work["pairs"].get<uint64_t>()),
+              static_cast<unsigned long long>(work["blends"].get<uint64_t>()));
   const auto& first = json["first_frame_ms"];
-  std::printf("first frame: %.1f ms from opening (open %.1f, prepare %.1f, render %.1f)\n", first["total"].get<double>(),
-              first["open"].get<double>(), first["prepare"].get<double>(), first["render"].get<double>());
-  std::printf("memory: renderer %.1f MB, process peak %.1f MB; packages: avatar %.2f MB, body %.2f MB\n",
-              lanes[0]["renderer_memory_bytes"].get<double>() * 1e-6, json["peak_memory_bytes"].get<double>() * 1e-6,
-              json["avatar_bytes"].get<double>() * 1e-6, json["body_bytes"].get<double>() * 1e-6);
+  std::printf("first frame: %.1f ms from opening (open %.1f, prepare %.1f, render %.1f)\n",
+              first["total"].get<double>(), first["open"].get<double>(),
+              first["prepare"].get<double>(), first["render"].get<double>());
+  std::printf(
+      "memory: renderer %.1f MB, process peak %.1f MB; packages: avatar %.2f MB, body %.2f MB\n",
+      lanes[0]["renderer_memory_bytes"].get<double>() * 1e-6,
+      json["peak_memory_bytes"].get<double>() * 1e-6, json["avatar_bytes"].get<double>() * 1e-6,
+      json["body_bytes"].get<double>() * 1e-6);
   if (!lanes[0]["allocations_per_frame"].is_null()) {
     std::printf("allocations a frame:");
     for (const auto& lane : lanes)
-      std::printf(" %.2f (%s, %u threads)", lane["allocations_per_frame"].get<double>(), lane["precision"].get<std::string>().c_str(),
-                  lane["threads"].get<uint32_t>());
+      std::printf(" %.2f (%s, %u threads)", lane["allocations_per_frame"].get<double>(),
+                  lane["precision"].get<std::string>().c_str(), lane["threads"].get<uint32_t>());
     std::printf("\n");
   }
 }
@@ -180,30 +197,38 @@ Status run_bench(const BenchOptions& options) {
     if (!frames.ok()) return frames.status();
     lane.frames = std::move(*frames);
     if (lane.frames.size() > options.frames) lane.frames.resize(options.frames);
-    Result<std::vector<Camera>> cameras = place_cameras(rig, lane.frames, *lane.cast, *lane.renderer);
+    Result<std::vector<Camera>> cameras =
+        place_cameras(rig, lane.frames, *lane.cast, *lane.renderer);
     if (!cameras.ok()) return cameras.status();
     lane.cameras = std::move(*cameras);
     if (!frame)
-      frame = std::make_unique<RenderedFrame>(ImageSize{lane.cameras[0].width_px, lane.cameras[0].height_px}, PixelFormat::kRgba8);
-    for (uint32_t i = 0; i < std::min(kWarmUpFrames, options.frames); ++i) FIG_RETURN_IF_ERROR(lane.render(i, *frame, false));
-    if (lanes.empty()) peak_bytes = peak_memory_bytes();  // of one renderer; the second one is the bench's, not the user's
+      frame = std::make_unique<RenderedFrame>(
+          ImageSize{lane.cameras[0].width_px, lane.cameras[0].height_px}, PixelFormat::kRgba8);
+    for (uint32_t i = 0; i < std::min(kWarmUpFrames, options.frames); ++i)
+      FIG_RETURN_IF_ERROR(lane.render(i, *frame, false));
+    if (lanes.empty())
+      peak_bytes =
+          peak_memory_bytes();  // of one renderer; the second one is the bench's, not the user's
     lanes.push_back(std::move(lane));
   }
 
   Progress progress("bench", options.frames);
   for (uint32_t i = 0; i < options.frames; ++i) {
     FIG_RETURN_IF_ERROR(check_interrupt());
-    for (size_t turn = 0; turn < lanes.size(); ++turn) FIG_RETURN_IF_ERROR(lanes[(i + turn) % lanes.size()].render(i, *frame, true));
+    for (size_t turn = 0; turn < lanes.size(); ++turn)
+      FIG_RETURN_IF_ERROR(lanes[(i + turn) % lanes.size()].render(i, *frame, true));
     progress.update(i + 1);
   }
 
   nlohmann::ordered_json json = json_header("bench");
   json["date"] = date_utc();
-  json["machine"] = json_machine(options.device, renderer_options->threads, to_string(lanes[0].precision));
+  json["machine"] =
+      json_machine(options.device, renderer_options->threads, to_string(lanes[0].precision));
   json["avatar"] = options.cast.avatars[0];
   json["avatar_bytes"] = lanes[0].cast->avatar(0).package->package.size_bytes();
   json["body_bytes"] = lanes[0].cast->body(0).package.size_bytes();
-  json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(options.cast.motions[0]);
+  json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json()
+                                                : nlohmann::ordered_json(options.cast.motions[0]);
   json["frames"] = options.frames;
   json["size"] = {lanes[0].cameras[0].width_px, lanes[0].cameras[0].height_px};
   json["first_frame_ms"] = {{"total", first.open_ms + first.prepare_ms + first.render_ms},
@@ -218,8 +243,10 @@ Status run_bench(const BenchOptions& options) {
   } else {
     print_table(json);
     if (!options.json.empty()) {
-      const std::string text = json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-      FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.json, std::as_bytes(std::span(text))));
+      const std::string text =
+          json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+      FIG_RETURN_IF_ERROR(
+          ports::write_file_atomically(options.json, std::as_bytes(std::span(text))));
     }
   }
   return {};
@@ -232,16 +259,24 @@ Command add_bench_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("bench", "Measures what a frame costs on this machine");
   options->cast.avatars.resize(1);
   command
-      ->add_option("avatar", options->cast.avatars[0],
-                   "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+      ->add_option(
+          "avatar", options->cast.avatars[0],
+          "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option("--body", options->cast.body,
-                      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
-  command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose, swaying")->expected(1);
-  command->add_option("--frames", options->frames, "measured frames")->check(CLI::Range(1u, 100000u))->capture_default_str();
+  command->add_option(
+      "--body", options->cast.body,
+      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command
+      ->add_option("--motion", options->cast.motions,
+                   "motion package; default: the golden pose, swaying")
+      ->expected(1);
+  command->add_option("--frames", options->frames, "measured frames")
+      ->check(CLI::Range(1u, 100000u))
+      ->capture_default_str();
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the golden frame's");
   options->device.add_to(*command, false);
-  command->add_option("--json", options->json, "write the figures to this file; - prints them instead of the table");
+  command->add_option("--json", options->json,
+                      "write the figures to this file; - prints them instead of the table");
   return {command, [options] { return run_bench(*options); }};
 }
 

@@ -1,4 +1,5 @@
-// --camera: "orbit:AZ,EL,DIST[,FOV]" (degrees, metres, vertical field of view) or the name of a JSON file (docs/json.md, "Camera").
+// --camera: "orbit:AZ,EL,DIST[,FOV]" (degrees, metres, vertical field of view) or the name of a
+// JSON file (docs/json.md, "Camera").
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -24,7 +25,8 @@ Result<Camera> parse_camera_json(const std::string& json, const std::string& nam
 // What parse_camera_json reads, value for value.
 nlohmann::ordered_json camera_json(const Camera& camera);
 
-// The fixed camera at the size asked for: same picture, other resolution. kInvalidArgument if the shapes of the two images differ.
+// The fixed camera at the size asked for: same picture, other resolution. kInvalidArgument if the
+// shapes of the two images differ.
 Result<Camera> resize_camera(const Camera& camera, ImageSize size);
 
 }  // namespace figurine::samples

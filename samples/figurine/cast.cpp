@@ -11,16 +11,20 @@ constexpr double kPi = 3.14159265358979323846;
 
 // Hamilton product a b, wxyz.
 std::array<float, 4> multiply(const std::array<float, 4>& a, const float* b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+          a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+          a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
 }
 
 // Rest position of the root joint of the person's own template.
 std::array<float, 3> rest_root(const Avatar& avatar, const Body& body) {
-  std::array<float, 3> root{body.joint_position_m[0], body.joint_position_m[1], body.joint_position_m[2]};
+  std::array<float, 3> root{body.joint_position_m[0], body.joint_position_m[1],
+                            body.joint_position_m[2]};
   if (avatar.template_mode != TemplateMode::kShaped) return root;
   for (size_t s = 0; s < avatar.shape.size(); ++s) {
-    for (size_t k = 0; k < 3; ++k) root[k] += avatar.shape[s] * body.joint_shape_basis_m[s * body.joint_position_m.size() + k];
+    for (size_t k = 0; k < 3; ++k)
+      root[k] += avatar.shape[s] * body.joint_shape_basis_m[s * body.joint_position_m.size() + k];
   }
   return root;
 }
@@ -30,10 +34,12 @@ std::array<float, 3> rest_root(const Avatar& avatar, const Body& body) {
 Result<Cast> Cast::load(const CastOptions& options) {
   const size_t count = options.avatars.size();
   if (options.motions.size() > 1 && options.motions.size() != count) {
-    return Status(StatusCode::kInvalidArgument, "motion: give one for all or one for each of the " + std::to_string(count) + " avatars");
+    return Status(StatusCode::kInvalidArgument, "motion: give one for all or one for each of the " +
+                                                    std::to_string(count) + " avatars");
   }
   if (!options.places.empty() && options.places.size() != count) {
-    return Status(StatusCode::kInvalidArgument, "place: give one for each of the " + std::to_string(count) + " avatars");
+    return Status(StatusCode::kInvalidArgument,
+                  "place: give one for each of the " + std::to_string(count) + " avatars");
   }
   Cast cast;
   for (size_t i = 0; i < count; ++i) {
@@ -42,7 +48,9 @@ Result<Cast> Cast::load(const CastOptions& options) {
     if (!avatar.ok()) return avatar.status();
     member.avatar = std::move(*avatar);
     for (const Member& other : cast.members_) {  // one body in memory, however many wear it
-      if (options.body.empty() && other.body->package.content_hash() == member.avatar->avatar.body_hash) member.body = other.body;
+      if (options.body.empty() &&
+          other.body->package.content_hash() == member.avatar->avatar.body_hash)
+        member.body = other.body;
     }
     if (!member.body) {
       Result<std::unique_ptr<LoadedPackage>> body = find_body(*member.avatar, options.body);
@@ -52,7 +60,8 @@ Result<Cast> Cast::load(const CastOptions& options) {
     const Body& body = member.body->package.body();
     if (!options.motions.empty()) {
       Result<std::unique_ptr<LoadedPackage>> motion =
-          load_package(options.motions.size() == 1 ? options.motions[0] : options.motions[i], PackageKind::kMotion);
+          load_package(options.motions.size() == 1 ? options.motions[0] : options.motions[i],
+                       PackageKind::kMotion);
       if (!motion.ok()) return motion.status();
       member.motion = std::move(*motion);
       const Motion& clip = member.motion->package.motion();
@@ -62,7 +71,8 @@ Result<Cast> Cast::load(const CastOptions& options) {
       if (i == 0) cast.frames_per_second_ = clip.frames_per_second;
     }
     if (options.places.empty()) {
-      member.place.x_m = options.spacing_m * (static_cast<float>(i) - 0.5f * static_cast<float>(count - 1));
+      member.place.x_m =
+          options.spacing_m * (static_cast<float>(i) - 0.5f * static_cast<float>(count - 1));
     } else {
       const Result<Placement> place = parse_placement(options.places[i]);
       if (!place.ok()) return place.status();
@@ -79,18 +89,22 @@ Result<Cast> Cast::load(const CastOptions& options) {
 Result<std::vector<uint32_t>> Cast::frames(const FrameRange& range) const {
   const uint32_t end = range.end.value_or(frame_count_);
   if (range.first >= frame_count_ || end > frame_count_) {
-    const std::string holds =
-        members_[0].motion ? "the motion has " + std::to_string(frame_count_) + " frames" : "without --motion there is one frame";
-    return Status(StatusCode::kInvalidArgument, "frames " + std::to_string(range.first) + ":" + std::to_string(end) + ": " + holds);
+    const std::string holds = members_[0].motion
+                                  ? "the motion has " + std::to_string(frame_count_) + " frames"
+                                  : "without --motion there is one frame";
+    return Status(StatusCode::kInvalidArgument, "frames " + std::to_string(range.first) + ":" +
+                                                    std::to_string(end) + ": " + holds);
   }
   std::vector<uint32_t> frames;
-  for (uint64_t frame = range.first; frame < end; frame += range.step) frames.push_back(static_cast<uint32_t>(frame));
+  for (uint64_t frame = range.first; frame < end; frame += range.step)
+    frames.push_back(static_cast<uint32_t>(frame));
   return frames;
 }
 
 Status Cast::add_to(Renderer& renderer, std::optional<Precision> precision) {
   for (size_t i = 0; i < members_.size(); ++i) {
-    const Result<AvatarId> id = renderer.add_avatar(members_[i].avatar->avatar, members_[i].body->package, precision);
+    const Result<AvatarId> id =
+        renderer.add_avatar(members_[i].avatar->avatar, members_[i].body->package, precision);
     if (!id.ok()) return id.status().within(members_[i].avatar->name);
     posed_[i].avatar = *id;
   }
@@ -99,13 +113,15 @@ Status Cast::add_to(Renderer& renderer, std::optional<Precision> precision) {
 
 std::string Cast::precision(const Renderer& renderer) const {
   const Precision first = renderer.precision(posed_[0].avatar);
-  const bool same =
-      std::all_of(posed_.begin(), posed_.end(), [&](const FrameAvatar& each) { return renderer.precision(each.avatar) == first; });
+  const bool same = std::all_of(posed_.begin(), posed_.end(), [&](const FrameAvatar& each) {
+    return renderer.precision(each.avatar) == first;
+  });
   return same ? to_string(first) : "mixed";
 }
 
 bool Cast::holds(Precision precision) const {
-  return std::all_of(members_.begin(), members_.end(), [&](const Member& member) { return member.avatar->avatar.holds(precision); });
+  return std::all_of(members_.begin(), members_.end(),
+                     [&](const Member& member) { return member.avatar->avatar.holds(precision); });
 }
 
 std::span<const FrameAvatar> Cast::pose(uint32_t frame) {
@@ -128,7 +144,8 @@ std::span<const FrameAvatar> Cast::sway(uint32_t moment) {
     for (size_t j = 0; j < member.rotations.size() / 4; ++j) {
       // Rates without a common period: no two moments of a run share a pose.
       const double angle = 0.05 * std::sin(0.37 * (moment + 1) + 2.399963 * static_cast<double>(j));
-      const std::array<float, 4> turn{static_cast<float>(std::cos(angle)), j % 3 == 0 ? static_cast<float>(std::sin(angle)) : 0.0f,
+      const std::array<float, 4> turn{static_cast<float>(std::cos(angle)),
+                                      j % 3 == 0 ? static_cast<float>(std::sin(angle)) : 0.0f,
                                       j % 3 == 1 ? static_cast<float>(std::sin(angle)) : 0.0f,
                                       j % 3 == 2 ? static_cast<float>(std::sin(angle)) : 0.0f};
       const std::array<float, 4> rotation = multiply(turn, &member.rotations[4 * j]);
@@ -138,19 +155,24 @@ std::span<const FrameAvatar> Cast::sway(uint32_t moment) {
   return posed_;
 }
 
-// p' = R_y(heading) p + place for the root's position p = rest + translation; the root's rotation turns with it.
+// p' = R_y(heading) p + place for the root's position p = rest + translation; the root's rotation
+// turns with it.
 void Cast::place_member(size_t index, const PoseView& pose) {
   Member& member = members_[index];
   std::copy(pose.rotations.begin(), pose.rotations.end(), member.rotations.begin());
   member.root_translation_m = pose.root_translation_m;
   const double heading = member.place.heading_deg * kPi / 180;
   if (heading != 0) {
-    const std::array<float, 4> turn{static_cast<float>(std::cos(0.5 * heading)), 0, static_cast<float>(std::sin(0.5 * heading)), 0};
+    const std::array<float, 4> turn{static_cast<float>(std::cos(0.5 * heading)), 0,
+                                    static_cast<float>(std::sin(0.5 * heading)), 0};
     const std::array<float, 4> root = multiply(turn, member.rotations.data());
     std::copy(root.begin(), root.end(), member.rotations.begin());
-    const double x = member.rest_root_m[0] + pose.root_translation_m[0], z = member.rest_root_m[2] + pose.root_translation_m[2];
-    member.root_translation_m[0] = static_cast<float>(std::cos(heading) * x + std::sin(heading) * z - member.rest_root_m[0]);
-    member.root_translation_m[2] = static_cast<float>(-std::sin(heading) * x + std::cos(heading) * z - member.rest_root_m[2]);
+    const double x = member.rest_root_m[0] + pose.root_translation_m[0],
+                 z = member.rest_root_m[2] + pose.root_translation_m[2];
+    member.root_translation_m[0] =
+        static_cast<float>(std::cos(heading) * x + std::sin(heading) * z - member.rest_root_m[0]);
+    member.root_translation_m[2] =
+        static_cast<float>(-std::sin(heading) * x + std::cos(heading) * z - member.rest_root_m[2]);
   }
   member.root_translation_m[0] += member.place.x_m;
   member.root_translation_m[2] += member.place.z_m;
@@ -165,7 +187,8 @@ std::array<float, 3> Cast::root_m(size_t member) const {
 
 float Cast::heading_deg(size_t member) const {
   const std::array<float, 9> r = rotation_from_quaternion(members_[member].rotations.data());
-  return static_cast<float>(std::atan2(r[2], r[8]) * 180 / kPi);  // the root's +z axis on the ground
+  return static_cast<float>(std::atan2(r[2], r[8]) * 180 /
+                            kPi);  // the root's +z axis on the ground
 }
 
 }  // namespace figurine::samples

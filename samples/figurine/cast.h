@@ -36,20 +36,24 @@ class Cast {
   // The frames of the range that exist. kInvalidArgument if it reaches beyond the motion.
   Result<std::vector<uint32_t>> frames(const FrameRange& range) const;
 
-  // Adds every avatar, in the precision asked for or the best that it holds. Identities are kept in order, one renderer at a time.
+  // Adds every avatar, in the precision asked for or the best that it holds. Identities are kept in
+  // order, one renderer at a time.
   Status add_to(Renderer& renderer, std::optional<Precision> precision);
   // What the avatars run in: "f32", "q8", or "mixed".
   std::string precision(const Renderer& renderer) const;
   // Whether every avatar holds it.
   bool holds(Precision precision) const;
-  // Everybody's pose in a frame of the motion, at their places; valid until the next call. Allocates nothing.
+  // Everybody's pose in a frame of the motion, at their places; valid until the next call.
+  // Allocates nothing.
   std::span<const FrameAvatar> pose(uint32_t frame);
-  // The same for a made-up moment of a cast without motion: every joint sways a few degrees about its pose, differently at each moment.
+  // The same for a made-up moment of a cast without motion: every joint sways a few degrees about
+  // its pose, differently at each moment.
   std::span<const FrameAvatar> sway(uint32_t moment);
 
   // World position of a member's root joint in the last pose.
   std::array<float, 3> root_m(size_t member) const;
-  // Where a member looks in the last pose, in degrees about the vertical: 0 is +z, positive towards +x.
+  // Where a member looks in the last pose, in degrees about the vertical: 0 is +z, positive towards
+  // +x.
   float heading_deg(size_t member) const;
 
  private:

@@ -1,4 +1,5 @@
-// One function per command of figurine: adds the subcommand and its options, and says how to run it.
+// One function per command of figurine: adds the subcommand and its options, and says how to run
+// it.
 #pragma once
 
 #include <functional>

@@ -16,10 +16,12 @@ class ContactSheet {
     ImageSize frame_size;
     uint32_t frame_count = 1;
     uint32_t columns = 6;
-    uint32_t tiles = 12;  // evenly chosen frames, first and last among them; fewer where there are fewer frames
+    uint32_t tiles =
+        12;  // evenly chosen frames, first and last among them; fewer where there are fewer frames
     uint32_t shrink = 1;  // tiles are 1 / shrink of a frame, averaged over shrink x shrink pixels
   };
-  // kInvalidArgument if the sheet would be larger than 16384 pixels a side, or a frame smaller than one tile pixel.
+  // kInvalidArgument if the sheet would be larger than 16384 pixels a side, or a frame smaller than
+  // one tile pixel.
   static Result<ContactSheet> create(const Options& options);
 
   // Frame number index of the sequence, RGBA with straight alpha; taken if it is one of the chosen.

@@ -32,7 +32,8 @@ struct DeviceOptions {
 // "command" and "version", the first fields of every --json output (docs/json.md).
 nlohmann::ordered_json json_header(const char* command);
 // CPU, usable CPUs, threads in use, precision of the networks that ran, and kernels.
-nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threads, const std::string& precision);
+nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threads,
+                                    const std::string& precision);
 void print_json(const nlohmann::ordered_json& json);
 
 }  // namespace figurine::samples

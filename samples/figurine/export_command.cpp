@@ -23,10 +23,12 @@ struct ExportOptions {
 Status run_export(const ExportOptions& options) {
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
-  if (!options.output.ends_with(".ply")) return Status(StatusCode::kUnsupported, options.output + ": Gaussians are exported as .ply");
+  if (!options.output.ends_with(".ply"))
+    return Status(StatusCode::kUnsupported, options.output + ": Gaussians are exported as .ply");
   Result<Cast> cast = Cast::load(options.cast);
   if (!cast.ok()) return cast.status();
-  const Result<std::vector<uint32_t>> frames = cast->frames({.first = options.frame, .end = options.frame + 1});
+  const Result<std::vector<uint32_t>> frames =
+      cast->frames({.first = options.frame, .end = options.frame + 1});
   if (!frames.ok()) return frames.status();
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
   if (!renderer.ok()) return renderer.status();
@@ -54,16 +56,22 @@ Status run_export(const ExportOptions& options) {
 
 Command add_export_command(CLI::App& app) {
   auto options = std::make_shared<ExportOptions>();
-  CLI::App* command = app.add_subcommand("export", "Writes an avatar in one pose as .ply Gaussians");
+  CLI::App* command =
+      app.add_subcommand("export", "Writes an avatar in one pose as .ply Gaussians");
   options->cast.avatars.resize(1);
   command
-      ->add_option("avatar", options->cast.avatars[0],
-                   "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+      ->add_option(
+          "avatar", options->cast.avatars[0],
+          "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option("--body", options->cast.body,
-                      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
-  command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose")->expected(1);
-  command->add_option("--frame", options->frame, "of the motion")->check(CLI::Range(0u, UINT32_MAX - 1))->capture_default_str();
+  command->add_option(
+      "--body", options->cast.body,
+      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose")
+      ->expected(1);
+  command->add_option("--frame", options->frame, "of the motion")
+      ->check(CLI::Range(0u, UINT32_MAX - 1))
+      ->capture_default_str();
   command->add_option("-o,--output", options->output, "x.ply")->required();
   options->device.add_to(*command);
   return {command, [options] { return run_export(*options); }};

@@ -26,7 +26,8 @@ Summary summarise(std::vector<double> values) {
 
 void FrameLog::add(const FrameStatistics& statistics, uint64_t total_ns) {
   total_ms_.push_back(static_cast<double>(total_ns) / kNsPerMs);
-  for (size_t s = 0; s < kStageCount; ++s) stage_ms_[s].push_back(static_cast<double>(statistics.stage_ns[s]) / kNsPerMs);
+  for (size_t s = 0; s < kStageCount; ++s)
+    stage_ms_[s].push_back(static_cast<double>(statistics.stage_ns[s]) / kNsPerMs);
   gaussians_.push_back(static_cast<double>(statistics.gaussians));
   visible_.push_back(static_cast<double>(statistics.visible));
   pairs_.push_back(static_cast<double>(statistics.pairs));
@@ -45,15 +46,19 @@ Summary FrameLog::stages_ms(std::span<const Stage> stages) const {
 
 nlohmann::ordered_json FrameLog::stages_json() const {
   const auto entry = [](const Summary& summary) {
-    return nlohmann::ordered_json{{"median", rounded(summary.median)}, {"p90", rounded(summary.p90)}};
+    return nlohmann::ordered_json{{"median", rounded(summary.median)},
+                                  {"p90", rounded(summary.p90)}};
   };
   nlohmann::ordered_json json = {{"total", entry(total_ms())}};
-  for (size_t s = 0; s < kStageCount; ++s) json[to_string(static_cast<Stage>(s))] = entry(summarise(stage_ms_[s]));
+  for (size_t s = 0; s < kStageCount; ++s)
+    json[to_string(static_cast<Stage>(s))] = entry(summarise(stage_ms_[s]));
   return json;
 }
 
 nlohmann::ordered_json FrameLog::work_json() const {
-  const auto count = [](const std::vector<double>& values) { return static_cast<uint64_t>(std::llround(summarise(values).median)); };
+  const auto count = [](const std::vector<double>& values) {
+    return static_cast<uint64_t>(std::llround(summarise(values).median));
+  };
   return {{"gaussians", count(gaussians_)},
           {"visible", count(visible_)},
           {"pairs", count(pairs_)},

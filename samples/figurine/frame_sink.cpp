@@ -24,15 +24,18 @@ ports::Image<T> without_alpha(const ports::Image<T>& rgba) {
 // Images are complete temporaries until the last one is: then all get their names.
 class ImageSink : public FrameSink {
  public:
-  ImageSink(NumberedName name, PixelFormat format, bool opaque) : name_(std::move(name)), format_(format), opaque_(opaque) {}
+  ImageSink(NumberedName name, PixelFormat format, bool opaque)
+      : name_(std::move(name)), format_(format), opaque_(opaque) {}
   PixelFormat format() const override { return format_; }
 
   Status add(const RenderedFrame& frame) override {
-    const Result<std::vector<std::byte>> bytes = format_ == PixelFormat::kRgbaF32
-                                                     ? ports::encode_pfm(opaque_ ? without_alpha(frame.f32) : frame.f32)
-                                                     : ports::encode_png(opaque_ ? without_alpha(frame.u8) : frame.u8);
+    const Result<std::vector<std::byte>> bytes =
+        format_ == PixelFormat::kRgbaF32
+            ? ports::encode_pfm(opaque_ ? without_alpha(frame.f32) : frame.f32)
+            : ports::encode_png(opaque_ ? without_alpha(frame.u8) : frame.u8);
     if (!bytes.ok()) return bytes.status();
-    Result<ports::AtomicFile> file = ports::AtomicFile::create(name_.name(static_cast<uint32_t>(files_.size())));
+    Result<ports::AtomicFile> file =
+        ports::AtomicFile::create(name_.name(static_cast<uint32_t>(files_.size())));
     if (!file.ok()) return file.status();
     files_.push_back(std::move(*file));
     FIG_RETURN_IF_ERROR(files_.back().write(*bytes));
@@ -72,40 +75,52 @@ RenderedFrame::RenderedFrame(ImageSize size, PixelFormat pixel_format) : format(
 }
 
 ImageTarget RenderedFrame::target() {
-  if (format == PixelFormat::kRgba8) return {.pixels = u8.pixels.data(), .stride_bytes = size_t(u8.width_px) * 4, .format = format};
-  return {.pixels = f32.pixels.data(), .stride_bytes = size_t(f32.width_px) * 4 * sizeof(float), .format = format};
+  if (format == PixelFormat::kRgba8)
+    return {.pixels = u8.pixels.data(), .stride_bytes = size_t(u8.width_px) * 4, .format = format};
+  return {.pixels = f32.pixels.data(),
+          .stride_bytes = size_t(f32.width_px) * 4 * sizeof(float),
+          .format = format};
 }
 
-bool is_video_name(const std::string& path) { return path.ends_with(".y4m") || path.ends_with(".mp4"); }
+bool is_video_name(const std::string& path) {
+  return path.ends_with(".y4m") || path.ends_with(".mp4");
+}
 
 ports::ImageU8 drop_alpha(const ports::ImageU8& rgba) { return without_alpha(rgba); }
 
-Result<std::unique_ptr<FrameSink>> FrameSink::create(const std::string& path, const Options& options) {
-  if (path.starts_with("/dev/video")) return Status(StatusCode::kUnsupported, path + ": video devices are unsupported in this build");
+Result<std::unique_ptr<FrameSink>> FrameSink::create(const std::string& path,
+                                                     const Options& options) {
+  if (path.starts_with("/dev/video"))
+    return Status(StatusCode::kUnsupported, path + ": video devices are unsupported in this build");
   if (is_video_name(path)) {
-    if (!options.opaque) return Status(StatusCode::kInvalidArgument, path + ": video has no alpha; give a --background colour");
+    if (!options.opaque)
+      return Status(StatusCode::kInvalidArgument,
+                    path + ": video has no alpha; give a --background colour");
     const Result<ports::FrameRate> rate = ports::make_frame_rate(options.frames_per_second);
     if (!rate.ok()) return rate.status().within(path);
-    Result<std::unique_ptr<ports::VideoWriter>> writer =
-        ports::VideoWriter::create(path, {.width_px = options.size.width_px, .height_px = options.size.height_px, .rate = *rate});
+    Result<std::unique_ptr<ports::VideoWriter>> writer = ports::VideoWriter::create(
+        path,
+        {.width_px = options.size.width_px, .height_px = options.size.height_px, .rate = *rate});
     if (!writer.ok()) return writer.status();
     return std::unique_ptr<FrameSink>(std::make_unique<VideoSink>(std::move(*writer)));
   }
   const bool pfm = path.ends_with(".pfm");
   if (!pfm && !path.ends_with(".png")) {
-    return Status(StatusCode::kUnsupported, path + ": output is written as .png, .pfm, .y4m or .mp4");
+    return Status(StatusCode::kUnsupported,
+                  path + ": output is written as .png, .pfm, .y4m or .mp4");
   }
   Result<NumberedName> name = NumberedName::parse(path);
   if (!name.ok()) return name.status();
   if (options.frame_count > 1 && !name->numbered()) {
-    return Status(StatusCode::kInvalidArgument,
-                  path + ": one image cannot hold " + std::to_string(options.frame_count) + " frames; number them, as in x_%04d.png");
+    return Status(StatusCode::kInvalidArgument, path + ": one image cannot hold " +
+                                                    std::to_string(options.frame_count) +
+                                                    " frames; number them, as in x_%04d.png");
   }
   // Tried now, not after the first frame was rendered.
   const Result<ports::AtomicFile> probe = ports::AtomicFile::create(name->name(0));
   if (!probe.ok()) return probe.status();
-  return std::unique_ptr<FrameSink>(
-      std::make_unique<ImageSink>(std::move(*name), pfm ? PixelFormat::kRgbaF32 : PixelFormat::kRgba8, options.opaque));
+  return std::unique_ptr<FrameSink>(std::make_unique<ImageSink>(
+      std::move(*name), pfm ? PixelFormat::kRgbaF32 : PixelFormat::kRgba8, options.opaque));
 }
 
 }  // namespace figurine::samples

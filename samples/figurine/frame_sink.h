@@ -1,4 +1,5 @@
-// Where rendered frames go: one image, numbered images, or a video. Everything appears at finish(), together, or not at all.
+// Where rendered frames go: one image, numbered images, or a video. Everything appears at finish(),
+// together, or not at all.
 #pragma once
 
 #include <memory>
@@ -11,7 +12,8 @@
 
 namespace figurine::samples {
 
-// A frame as the renderer wrote it, RGBA with straight alpha, in the one of the two forms that the sink asked for.
+// A frame as the renderer wrote it, RGBA with straight alpha, in the one of the two forms that the
+// sink asked for.
 struct RenderedFrame {
   ports::ImageU8 u8;
   ports::ImageF32 f32;
@@ -29,8 +31,9 @@ class FrameSink {
     double frames_per_second = 30;
     bool opaque = false;  // a background was drawn: images are RGB instead of RGBA
   };
-  // By the name: .png and .pfm (with %d or %04d for more than one frame, numbered from 0), .y4m, .mp4. kUnsupported for other names and for
-  // /dev/video*, kInvalidArgument for several frames into one image, or a video without a background.
+  // By the name: .png and .pfm (with %d or %04d for more than one frame, numbered from 0), .y4m,
+  // .mp4. kUnsupported for other names and for /dev/video*, kInvalidArgument for several frames
+  // into one image, or a video without a background.
   static Result<std::unique_ptr<FrameSink>> create(const std::string& path, const Options& options);
 
   virtual ~FrameSink() = default;  // without finish(): nothing remains

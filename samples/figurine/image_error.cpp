@@ -14,12 +14,19 @@ void ErrorSum::add(double difference) {
   largest = std::max(largest, std::abs(difference));
 }
 
-double ErrorSum::rmse() const { return values == 0 ? 0 : std::sqrt(squared / static_cast<double>(values)); }
+double ErrorSum::rmse() const {
+  return values == 0 ? 0 : std::sqrt(squared / static_cast<double>(values));
+}
 
-double ErrorSum::psnr_db() const { return squared > 0 ? -20 * std::log10(rmse()) : std::numeric_limits<double>::infinity(); }
+double ErrorSum::psnr_db() const {
+  return squared > 0 ? -20 * std::log10(rmse()) : std::numeric_limits<double>::infinity();
+}
 
-void add_foreground_error(const ports::ImageF32& truth, const ports::ImageF32& picture, ErrorSum& sum) {
-  FIG_CHECK(truth.pixels.size() == picture.pixels.size() && truth.channels == 4 && picture.channels == 4, "two RGBA images of one size");
+void add_foreground_error(const ports::ImageF32& truth, const ports::ImageF32& picture,
+                          ErrorSum& sum) {
+  FIG_CHECK(
+      truth.pixels.size() == picture.pixels.size() && truth.channels == 4 && picture.channels == 4,
+      "two RGBA images of one size");
   constexpr double kGrey = 0.5;
   for (size_t i = 0; i + 3 < truth.pixels.size(); i += 4) {
     const float* t = &truth.pixels[i];

@@ -18,8 +18,9 @@ struct ErrorSum {
   double psnr_db() const;  // infinity without any difference
 };
 
-// Adds the foreground of one frame: pixels whose alpha in the truth exceeds 0.5, both pictures over mid-grey. RGBA, straight alpha, equal
-// sizes.
-void add_foreground_error(const ports::ImageF32& truth, const ports::ImageF32& picture, ErrorSum& sum);
+// Adds the foreground of one frame: pixels whose alpha in the truth exceeds 0.5, both pictures over
+// mid-grey. RGBA, straight alpha, equal sizes.
+void add_foreground_error(const ports::ImageF32& truth, const ports::ImageF32& picture,
+                          ErrorSum& sum);
 
 }  // namespace figurine::samples

@@ -12,12 +12,15 @@ namespace figurine::samples {
 
 namespace {
 
-// The .fgn files of a folder in the order of their names, so that the same folder always gives the same answer. None if it cannot be read.
+// The .fgn files of a folder in the order of their names, so that the same folder always gives the
+// same answer. None if it cannot be read.
 std::vector<std::string> packages_in(const std::string& folder) {
   std::vector<std::string> paths;
   std::error_code error;
-  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().extension() == ".fgn" && entry->is_regular_file(error)) paths.push_back(entry->path().string());
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".fgn" && entry->is_regular_file(error))
+      paths.push_back(entry->path().string());
   }
   std::sort(paths.begin(), paths.end());
   return paths;
@@ -30,39 +33,47 @@ Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path) {
   if (!file.ok()) return file.status();
   Result<Package> package = Package::open(file->bytes(), path);
   if (!package.ok()) return package.status();
-  return std::make_unique<LoadedPackage>(LoadedPackage{path, std::move(*file), std::move(*package)});
+  return std::make_unique<LoadedPackage>(
+      LoadedPackage{path, std::move(*file), std::move(*package)});
 }
 
 Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted) {
   Result<std::unique_ptr<LoadedPackage>> loaded = load_package(path);
   if (loaded.ok() && (*loaded)->package.kind() != wanted) {
-    return Status(StatusCode::kInvalidArgument,
-                  path + ": kind: is a package of kind " + to_string((*loaded)->package.kind()) + ", not " + to_string(wanted));
+    return Status(StatusCode::kInvalidArgument, path + ": kind: is a package of kind " +
+                                                    to_string((*loaded)->package.kind()) +
+                                                    ", not " + to_string(wanted));
   }
   return loaded;
 }
 
 namespace {
 
-// "people.fgn#17" in its parts. A file of the whole name goes first: '#' is no unusual letter in a path.
+// "people.fgn#17" in its parts. A file of the whole name goes first: '#' is no unusual letter in a
+// path.
 std::pair<std::string, std::optional<std::string>> split_member(const std::string& name) {
   const size_t hash = name.rfind('#');
   std::error_code error;
-  if (hash == std::string::npos || std::filesystem::exists(name, error)) return {name, std::nullopt};
+  if (hash == std::string::npos || std::filesystem::exists(name, error))
+    return {name, std::nullopt};
   return {name.substr(0, hash), name.substr(hash + 1)};
 }
 
-Status open_population_member(const Population& population, const std::string& path, const std::optional<std::string>& member,
-                              LoadedAvatar& out) {
-  const std::string count = std::to_string(population.size()), last = std::to_string(population.size() - 1);
+Status open_population_member(const Population& population, const std::string& path,
+                              const std::optional<std::string>& member, LoadedAvatar& out) {
+  const std::string count = std::to_string(population.size()),
+                    last = std::to_string(population.size() - 1);
   if (!member) {
-    return Status(StatusCode::kInvalidArgument,
-                  path + ": is a population: name one of its " + count + " members, " + path + "#NAME or " + path + "#0 to #" + last);
+    return Status(StatusCode::kInvalidArgument, path + ": is a population: name one of its " +
+                                                    count + " members, " + path + "#NAME or " +
+                                                    path + "#0 to #" + last);
   }
   const std::optional<size_t> index = find_member(population, *member);
   if (!index) {
-    return Status(StatusCode::kNotFound, path + ": member '" + *member + "': there is none of this name, and its " + count +
-                                             " members have the numbers 0 to " + last + " (figurine-inspect lists them)");
+    return Status(StatusCode::kNotFound, path + ": member '" + *member +
+                                             "': there is none of this name, and its " + count +
+                                             " members have the numbers 0 to " + last +
+                                             " (figurine-inspect lists them)");
   }
   out.storage.resize(member_floats(population));
   out.avatar = open_member(population, *index, out.storage);
@@ -83,23 +94,28 @@ Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name) {
   }
   if (member) {
     return Status(StatusCode::kInvalidArgument,
-                  path + ": member '" + *member + "': a package of kind " + to_string(opened.kind()) + " has no members, a population has");
+                  path + ": member '" + *member + "': a package of kind " +
+                      to_string(opened.kind()) + " has no members, a population has");
   }
   if (opened.kind() == PackageKind::kSampler) {
-    return Status(StatusCode::kInvalidArgument, path + ": kind: is a sampler: figurine sample makes an avatar of it");
+    return Status(StatusCode::kInvalidArgument,
+                  path + ": kind: is a sampler: figurine sample makes an avatar of it");
   }
   if (opened.kind() != PackageKind::kAvatar) {
-    return Status(StatusCode::kInvalidArgument, path + ": kind: is a package of kind " + to_string(opened.kind()) + ", not avatar");
+    return Status(StatusCode::kInvalidArgument, path + ": kind: is a package of kind " +
+                                                    to_string(opened.kind()) + ", not avatar");
   }
   loaded->avatar = opened.avatar();
   return loaded;
 }
 
-Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar, const std::string& body_option) {
+Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar,
+                                                 const std::string& body_option) {
   return find_body(avatar.avatar, avatar.name, avatar.package->path, body_option);
 }
 
-Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& wanted, const std::string& name, const std::string& beside,
+Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& wanted, const std::string& name,
+                                                 const std::string& beside,
                                                  const std::string& body_option) {
   if (!body_option.empty()) {
     Result<std::unique_ptr<LoadedPackage>> body = load_package(body_option, PackageKind::kBody);
@@ -127,11 +143,13 @@ Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& wanted, const std
         if (!fits.ok()) return fits.within(name + " on " + path);
         return candidate;
       }
-      others += (others.empty() ? "" : ", ") + path + " is " + format_hash((*candidate)->package.content_hash());
+      others += (others.empty() ? "" : ", ") + path + " is " +
+                format_hash((*candidate)->package.content_hash());
     }
   }
   return Status(others.empty() ? StatusCode::kNotFound : StatusCode::kMismatch,
-                name + ": body: needs " + format_hash(wanted.body_hash) + " (" + wanted.body_name + "); looked in " + looked_in +
+                name + ": body: needs " + format_hash(wanted.body_hash) + " (" + wanted.body_name +
+                    "); looked in " + looked_in +
                     (others.empty() ? "; no body there" : "; found others: " + others));
 }
 

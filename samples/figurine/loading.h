@@ -1,4 +1,5 @@
-// Packages from files: opened by memory map, checked for their kind, avatars also out of populations, bodies found for avatars.
+// Packages from files: opened by memory map, checked for their kind, avatars also out of
+// populations, bodies found for avatars.
 #pragma once
 
 #include <memory>
@@ -18,7 +19,8 @@ struct LoadedPackage {
   Package package;
 };
 
-// kNotFound, kCorrupt... as the file and the reader say; kInvalidArgument names both kinds if it is another one than wanted.
+// kNotFound, kCorrupt... as the file and the reader say; kInvalidArgument names both kinds if it is
+// another one than wanted.
 Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted);
 
 // Of any kind.
@@ -32,16 +34,20 @@ struct LoadedAvatar {
   Avatar avatar;                           // points into both
 };
 
-// "PATH" of an avatar, or "PATH#MEMBER" of a population, MEMBER a name or a number counted from 0. One line says so if the package is of
-// the other kind or has no such member.
+// "PATH" of an avatar, or "PATH#MEMBER" of a population, MEMBER a name or a number counted from 0.
+// One line says so if the package is of the other kind or has no such member.
 Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name);
 
-// The body that an avatar was made for: body_option if given (it must be the right one), else the .fgn files beside the avatar, else those
-// of the folders in FIGURINE_PATH (colon-separated). Found by content hash, whatever the file is called. Errors name the hash that is
-// wanted and the hashes that were found.
-Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar, const std::string& body_option);
-// The same of an avatar that is no file yet: name is what messages call it, beside the path of what it was made from.
-Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& avatar, const std::string& name, const std::string& beside,
+// The body that an avatar was made for: body_option if given (it must be the right one), else the
+// .fgn files beside the avatar, else those of the folders in FIGURINE_PATH (colon-separated). Found
+// by content hash, whatever the file is called. Errors name the hash that is wanted and the hashes
+// that were found.
+Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar,
+                                                 const std::string& body_option);
+// The same of an avatar that is no file yet: name is what messages call it, beside the path of what
+// it was made from.
+Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& avatar, const std::string& name,
+                                                 const std::string& beside,
                                                  const std::string& body_option);
 
 }  // namespace figurine::samples

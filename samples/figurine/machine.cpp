@@ -17,7 +17,8 @@ std::string proc_value(const char* path, const std::string& key) {
   for (std::string line; std::getline(file, line);) {
     if (!line.starts_with(key)) continue;
     const size_t colon = line.find(':');
-    const size_t value = colon == std::string::npos ? colon : line.find_first_not_of(" \t", colon + 1);
+    const size_t value =
+        colon == std::string::npos ? colon : line.find_first_not_of(" \t", colon + 1);
     if (value != std::string::npos) return line.substr(value);
   }
   return {};
@@ -26,14 +27,16 @@ std::string proc_value(const char* path, const std::string& key) {
 }  // namespace
 
 uint64_t now_ns() {
-  return static_cast<uint64_t>(
-      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count());
+  return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                   std::chrono::steady_clock::now().time_since_epoch())
+                                   .count());
 }
 
 uint32_t usable_cpus() {
   cpu_set_t set;
   CPU_ZERO(&set);
-  return ::sched_getaffinity(0, sizeof(set), &set) == 0 ? static_cast<uint32_t>(CPU_COUNT(&set)) : 1;
+  return ::sched_getaffinity(0, sizeof(set), &set) == 0 ? static_cast<uint32_t>(CPU_COUNT(&set))
+                                                        : 1;
 }
 
 std::string cpu_name() {
@@ -44,7 +47,9 @@ std::string cpu_name() {
   return "unknown";
 }
 
-uint64_t peak_memory_bytes() { return std::strtoull(proc_value("/proc/self/status", "VmHWM").c_str(), nullptr, 10) * 1024; }
+uint64_t peak_memory_bytes() {
+  return std::strtoull(proc_value("/proc/self/status", "VmHWM").c_str(), nullptr, 10) * 1024;
+}
 
 std::string date_utc() {
   const std::time_t now = std::time(nullptr);

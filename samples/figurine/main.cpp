@@ -1,7 +1,7 @@
 // figurine: avatars and Gaussians on this device.
 //
-// Exit codes: 0 done, 1 bad input (one line naming file, field and reason; no output file), 2 usage, 3 a bug of figurine. An interrupt ends
-// the process the way the signal would have.
+// Exit codes: 0 done, 1 bad input (one line naming file, field and reason; no output file), 2
+// usage, 3 a bug of figurine. An interrupt ends the process the way the signal would have.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -15,10 +15,11 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", "figurine " FIGURINE_VERSION);
   try {
-    const samples::Command commands[] = {samples::add_sample_command(app),  samples::add_render_command(app),
-                                         samples::add_splat_command(app),   samples::add_export_command(app),
-                                         samples::add_bench_command(app),   samples::add_report_command(app),
-                                         samples::add_selftest_command(app)};
+    const samples::Command commands[] = {
+        samples::add_sample_command(app),  samples::add_render_command(app),
+        samples::add_splat_command(app),   samples::add_export_command(app),
+        samples::add_bench_command(app),   samples::add_report_command(app),
+        samples::add_selftest_command(app)};
     app.parse(argc, argv);
     samples::catch_interrupts();
     for (const samples::Command& command : commands) {

@@ -24,7 +24,9 @@ std::optional<std::vector<double>> parse_numbers(std::string_view text, size_t m
   while (true) {
     const size_t comma = text.find(',');
     double value = 0;
-    if (!parse_number(text.substr(0, comma), value) || !std::isfinite(value) || values.size() == max_count) return std::nullopt;
+    if (!parse_number(text.substr(0, comma), value) || !std::isfinite(value) ||
+        values.size() == max_count)
+      return std::nullopt;
     values.push_back(value);
     if (comma == std::string_view::npos) return values;
     text.remove_prefix(comma + 1);
@@ -39,7 +41,8 @@ Result<ImageSize> parse_size(std::string_view text) {
     return invalid("size " + quoted(text) + " is not WIDTHxHEIGHT");
   }
   for (const uint32_t side : {size.width_px, size.height_px}) {
-    if (side < 1 || side > 16384) return invalid("size " + quoted(text) + ": a side is not within 1 and 16384 pixels");
+    if (side < 1 || side > 16384)
+      return invalid("size " + quoted(text) + ": a side is not within 1 and 16384 pixels");
   }
   return size;
 }
@@ -62,13 +65,14 @@ Result<FrameRange> parse_frames(std::string_view text) {
   }
   uint32_t last = 0;
   const bool has_step = second_colon != std::string_view::npos;
-  if ((!first.empty() && !parse_number(first, range.first)) || (!end.empty() && !parse_number(end, last)) ||
-      (has_step && !parse_number(step, range.step))) {
+  if ((!first.empty() && !parse_number(first, range.first)) ||
+      (!end.empty() && !parse_number(end, last)) || (has_step && !parse_number(step, range.step))) {
     return invalid("frames " + quoted(text) + ": not N, A:B or A:B:STEP");
   }
   if (range.step < 1) return invalid("frames " + quoted(text) + ": the step must be at least 1");
   if (!end.empty()) range.end = last;
-  if (range.end && *range.end <= range.first) return invalid("frames " + quoted(text) + ": holds no frame");
+  if (range.end && *range.end <= range.first)
+    return invalid("frames " + quoted(text) + ": holds no frame");
   return range;
 }
 
@@ -82,7 +86,8 @@ Result<Background> parse_background(std::string_view text) {
     uint32_t code = 0;
     const auto [end, error] = std::from_chars(text.data() + 1, text.data() + 7, code, 16);
     if (error == std::errc() && end == text.data() + 7) {
-      for (int k = 0; k < 3; ++k) colour[k] = static_cast<float>((code >> (16 - 8 * k)) & 255) / 255.0f;
+      for (int k = 0; k < 3; ++k)
+        colour[k] = static_cast<float>((code >> (16 - 8 * k)) & 255) / 255.0f;
       return Background{colour};
     }
   }
@@ -92,15 +97,19 @@ Result<Background> parse_background(std::string_view text) {
     sound = (*values)[k] >= 0 && (*values)[k] <= 1;
     colour[k] = static_cast<float>((*values)[k]);
   }
-  if (!sound) return invalid("background " + quoted(text) + ": not alpha, black, grey, white, #RRGGBB or R,G,B within 0 and 1");
+  if (!sound)
+    return invalid("background " + quoted(text) +
+                   ": not alpha, black, grey, white, #RRGGBB or R,G,B within 0 and 1");
   return Background{colour};
 }
 
 Result<Placement> parse_placement(std::string_view text) {
   const std::optional<std::vector<double>> values = parse_numbers(text, 3);
-  if (!values || values->size() < 2) return invalid("place " + quoted(text) + ": not X,Z or X,Z,HEADING");
+  if (!values || values->size() < 2)
+    return invalid("place " + quoted(text) + ": not X,Z or X,Z,HEADING");
   for (const double value : *values) {
-    if (std::abs(value) > 1e4) return invalid("place " + quoted(text) + ": a value is beyond 10000");
+    if (std::abs(value) > 1e4)
+      return invalid("place " + quoted(text) + ": a value is beyond 10000");
   }
   return Placement{static_cast<float>((*values)[0]), static_cast<float>((*values)[1]),
                    values->size() == 3 ? static_cast<float>((*values)[2]) : 0.0f};
@@ -115,7 +124,8 @@ Result<NumberedName> NumberedName::parse(const std::string& text) {
   }
   size_t at = percent + 1;
   if (at < text.size() && text[at] == '0') ++at;
-  if (at < text.size() && text[at] >= '1' && text[at] <= '9' && at > percent + 1) result.digits_ = static_cast<uint32_t>(text[at++] - '0');
+  if (at < text.size() && text[at] >= '1' && text[at] <= '9' && at > percent + 1)
+    result.digits_ = static_cast<uint32_t>(text[at++] - '0');
   if (at >= text.size() || text[at] != 'd' || text.find('%', at) != std::string::npos) {
     return invalid(text + ": a numbered name has one %d or %04d in it");
   }

@@ -1,5 +1,5 @@
-// The small languages of figurine's command line: sizes, ranges, colours, places, frame names. Text in, value or one-line reason out; no
-// files.
+// The small languages of figurine's command line: sizes, ranges, colours, places, frame names. Text
+// in, value or one-line reason out; no files.
 #pragma once
 
 #include <array>
@@ -19,8 +19,8 @@ struct ImageSize {
 };
 Result<ImageSize> parse_size(std::string_view text);  // "512x384", 1 to 16384 a side
 
-// Every step-th frame of [first, end). "12" is one frame, "10:40" frames 10 to 39, "10:40:4" every fourth of them, "10:" to the end, ":"
-// all.
+// Every step-th frame of [first, end). "12" is one frame, "10:40" frames 10 to 39, "10:40:4" every
+// fourth of them, "10:" to the end, ":" all.
 struct FrameRange {
   uint32_t first = 0;
   std::optional<uint32_t> end;
@@ -28,13 +28,15 @@ struct FrameRange {
 };
 Result<FrameRange> parse_frames(std::string_view text);
 
-// Opaque colour, or none for "alpha". "alpha", "black", "grey", "white", "#e0e4e8", or "0.9,0.9,0.9" with values in [0,1].
+// Opaque colour, or none for "alpha". "alpha", "black", "grey", "white", "#e0e4e8", or
+// "0.9,0.9,0.9" with values in [0,1].
 struct Background {
   std::optional<std::array<float, 3>> colour;
 };
 Result<Background> parse_background(std::string_view text);
 
-// Where a figure stands: metres on the ground, degrees about the vertical (positive turns it to its left). "X,Z" or "X,Z,HEADING".
+// Where a figure stands: metres on the ground, degrees about the vertical (positive turns it to its
+// left). "X,Z" or "X,Z,HEADING".
 struct Placement {
   float x_m = 0;
   float z_m = 0;
@@ -42,7 +44,8 @@ struct Placement {
 };
 Result<Placement> parse_placement(std::string_view text);
 
-// A file name with one "%d" or "%04d" in it, for numbered images. Any other use of '%' is an error ("%%" is not known).
+// A file name with one "%d" or "%04d" in it, for numbered images. Any other use of '%' is an error
+// ("%%" is not known).
 class NumberedName {
  public:
   static Result<NumberedName> parse(const std::string& text);

@@ -17,7 +17,8 @@ void note_signal(int signal) { noted_signal = signal; }
 
 }  // namespace
 
-Progress::Progress(std::string what, uint64_t total) : what_(std::move(what)), total_(total), terminal_(::isatty(STDERR_FILENO) == 1) {}
+Progress::Progress(std::string what, uint64_t total)
+    : what_(std::move(what)), total_(total), terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() {
   if (shown_) std::fputs("\r\033[K", stderr);
@@ -31,9 +32,13 @@ void Progress::update(uint64_t done) {
   shown_ = true;
   constexpr uint64_t kWidth = 30;
   const uint64_t filled = total_ == 0 ? 0 : std::min(kWidth, kWidth * done / total_);
-  const double left_s = done == 0 ? 0 : elapsed_s * static_cast<double>(total_ - std::min(done, total_)) / static_cast<double>(done);
-  std::fprintf(stderr, "\r%s [%s%s] %llu/%llu, %.1f/s, %.0f s left\033[K", what_.c_str(), std::string(filled, '#').c_str(),
-               std::string(kWidth - filled, '.').c_str(), static_cast<unsigned long long>(done), static_cast<unsigned long long>(total_),
+  const double left_s = done == 0
+                            ? 0
+                            : elapsed_s * static_cast<double>(total_ - std::min(done, total_)) /
+                                  static_cast<double>(done);
+  std::fprintf(stderr, "\r%s [%s%s] %llu/%llu, %.1f/s, %.0f s left\033[K", what_.c_str(),
+               std::string(filled, '#').c_str(), std::string(kWidth - filled, '.').c_str(),
+               static_cast<unsigned long long>(done), static_cast<unsigned long long>(total_),
                static_cast<double>(done) / elapsed_s, left_s);
   std::fflush(stderr);
 }
@@ -46,7 +51,10 @@ void catch_interrupts() {
   std::signal(SIGPIPE, SIG_IGN);
 }
 
-Status check_interrupt() { return noted_signal == 0 ? Status() : Status(StatusCode::kInterrupted, "interrupted; nothing was written"); }
+Status check_interrupt() {
+  return noted_signal == 0 ? Status()
+                           : Status(StatusCode::kInterrupted, "interrupted; nothing was written");
+}
 
 void die_of_interrupt() {
   std::signal(noted_signal, SIG_DFL);

@@ -9,7 +9,8 @@
 
 namespace figurine::samples {
 
-// Shown on stderr after the first second, at most ten times a second, and wiped at the end. Says nothing when stderr is no terminal.
+// Shown on stderr after the first second, at most ten times a second, and wiped at the end. Says
+// nothing when stderr is no terminal.
 class Progress {
  public:
   Progress(std::string what, uint64_t total);
@@ -28,8 +29,9 @@ class Progress {
   Clock::time_point last_{};
 };
 
-// From here on SIGINT and SIGTERM are only noted; long loops ask for the note and leave with kInterrupted, so that destructors remove what
-// is half done. SIGPIPE is ignored: a reader that goes away is an error of write().
+// From here on SIGINT and SIGTERM are only noted; long loops ask for the note and leave with
+// kInterrupted, so that destructors remove what is half done. SIGPIPE is ignored: a reader that
+// goes away is an error of write().
 void catch_interrupts();
 Status check_interrupt();
 // Ends the process the way the noted signal would have, so that shells and scripts see the truth.

@@ -27,7 +27,8 @@ struct RenderOptions {
   ContactSheet::Options sheet;
 };
 
-constexpr std::array<float, 3> kVideoBackground{0.86f, 0.88f, 0.90f};  // a light, slightly cool grey: dark and light clothes stand out
+constexpr std::array<float, 3> kVideoBackground{
+    0.86f, 0.88f, 0.90f};  // a light, slightly cool grey: dark and light clothes stand out
 
 // Everything that the command line said, checked and loaded.
 struct Job {
@@ -40,20 +41,27 @@ struct Job {
 
 Result<Job> prepare(const RenderOptions& options) {
   if (options.output.empty() && options.contact_sheet.empty()) {
-    return Status(StatusCode::kInvalidArgument, "render: nothing to write; give -o or --contact-sheet");
+    return Status(StatusCode::kInvalidArgument,
+                  "render: nothing to write; give -o or --contact-sheet");
   }
   if (options.output.starts_with("/dev/video")) {
-    return Status(StatusCode::kUnsupported, options.output + ": video devices are unsupported in this build");
+    return Status(StatusCode::kUnsupported,
+                  options.output + ": video devices are unsupported in this build");
   }
-  Result<Background> background = parse_background(options.background.empty() ? "alpha" : options.background);
+  Result<Background> background =
+      parse_background(options.background.empty() ? "alpha" : options.background);
   if (!background.ok()) return background.status();
-  if (options.background.empty() && is_video_name(options.output)) background->colour = kVideoBackground;
+  if (options.background.empty() && is_video_name(options.output))
+    background->colour = kVideoBackground;
 
   Result<Cast> cast = Cast::load(options.cast);
   if (!cast.ok()) return cast.status();
   // One image of a motion is its first frame, unless a frame is named; a sequence is all of it.
-  const bool one_image = options.output.find('%') == std::string::npos && !is_video_name(options.output) && options.contact_sheet.empty();
-  const Result<FrameRange> range = parse_frames(!options.frames.empty() ? options.frames : one_image ? "0" : ":");
+  const bool one_image = options.output.find('%') == std::string::npos &&
+                         !is_video_name(options.output) && options.contact_sheet.empty();
+  const Result<FrameRange> range = parse_frames(!options.frames.empty() ? options.frames
+                                                : one_image             ? "0"
+                                                                        : ":");
   if (!range.ok()) return range.status();
   Result<std::vector<uint32_t>> frames = cast->frames(*range);
   if (!frames.ok()) return frames.status();
@@ -82,7 +90,8 @@ Status run_render(const RenderOptions& options) {
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
   if (!renderer.ok()) return renderer.status();
   FIG_RETURN_IF_ERROR(job->cast.add_to(**renderer, options.device.network_precision()));
-  const Result<std::vector<Camera>> cameras = place_cameras(job->rig, job->frames, job->cast, **renderer);
+  const Result<std::vector<Camera>> cameras =
+      place_cameras(job->rig, job->frames, job->cast, **renderer);
   if (!cameras.ok()) return cameras.status();
   const ImageSize size{cameras->front().width_px, cameras->front().height_px};
   const auto frame_count = static_cast<uint32_t>(job->frames.size());
@@ -90,8 +99,11 @@ Status run_render(const RenderOptions& options) {
 
   std::unique_ptr<FrameSink> sink;
   if (!options.output.empty()) {
-    Result<std::unique_ptr<FrameSink>> created = FrameSink::create(
-        options.output, {.size = size, .frame_count = frame_count, .frames_per_second = job->frames_per_second, .opaque = opaque});
+    Result<std::unique_ptr<FrameSink>> created =
+        FrameSink::create(options.output, {.size = size,
+                                           .frame_count = frame_count,
+                                           .frames_per_second = job->frames_per_second,
+                                           .opaque = opaque});
     if (!created.ok()) return created.status();
     sink = std::move(*created);
   }
@@ -104,7 +116,9 @@ Status run_render(const RenderOptions& options) {
     if (!created.ok()) return created.status();
     sheet = std::move(*created);
     if (sink && sink->format() != PixelFormat::kRgba8) {
-      return Status(StatusCode::kUnsupported, options.output + ": a contact sheet is made beside 8-bit images or video, not .pfm");
+      return Status(
+          StatusCode::kUnsupported,
+          options.output + ": a contact sheet is made beside 8-bit images or video, not .pfm");
     }
   }
 
@@ -115,8 +129,10 @@ Status run_render(const RenderOptions& options) {
   for (uint32_t i = 0; i < frame_count; ++i) {
     FIG_RETURN_IF_ERROR(check_interrupt());
     const uint64_t frame_start_ns = now_ns();
-    FIG_RETURN_IF_ERROR((*renderer)->render(
-        {.camera = (*cameras)[i], .avatars = job->cast.pose(job->frames[i]), .background = job->background}, frame.target()));
+    FIG_RETURN_IF_ERROR((*renderer)->render({.camera = (*cameras)[i],
+                                             .avatars = job->cast.pose(job->frames[i]),
+                                             .background = job->background},
+                                            frame.target()));
     log.add((*renderer)->statistics(), now_ns() - frame_start_ns);
     if (sink) FIG_RETURN_IF_ERROR(sink->add(frame));
     if (sheet) sheet->offer(i, frame.u8);
@@ -133,14 +149,16 @@ Status run_render(const RenderOptions& options) {
     if (sheet) json["contact_sheet"] = options.contact_sheet;
     json["frames"] = frame_count;
     json["size"] = {size.width_px, size.height_px};
-    json["camera"] = camera_json(cameras->front());                            // of the first frame
-    json["frames_per_second"] = 1000 / std::max(log.total_ms().median, 1e-6);  // of rendering, by the median frame
+    json["camera"] = camera_json(cameras->front());  // of the first frame
+    json["frames_per_second"] =
+        1000 / std::max(log.total_ms().median, 1e-6);  // of rendering, by the median frame
     json["frames_per_second_with_output"] = frame_count / std::max(wall_s, 1e-9);
     json["stages_ms"] = log.stages_json();
     json["work"] = log.work_json();
     json["renderer_memory_bytes"] = (*renderer)->memory_bytes();
     json["peak_memory_bytes"] = peak_memory_bytes();
-    json["machine"] = json_machine(options.device, renderer_options->threads, job->cast.precision(**renderer));
+    json["machine"] =
+        json_machine(options.device, renderer_options->threads, job->cast.precision(**renderer));
     print_json(json);
   }
   return {};
@@ -152,30 +170,56 @@ Command add_render_command(CLI::App& app) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = app.add_subcommand("render", "Renders avatars to images or video");
   command
-      ->add_option("avatars", options->cast.avatars, "avatar packages (.fgn), or members of populations (people.fgn#NAME, people.fgn#17)")
+      ->add_option(
+          "avatars", options->cast.avatars,
+          "avatar packages (.fgn), or members of populations (people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option("--body", options->cast.body,
-                      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
-  command->add_option("--motion", options->cast.motions, "motion packages: one for all avatars, or one for each")->expected(1)->take_all();
-  command->add_option("--frames", options->frames, "N, A:B or A:B:STEP (B excluded); default: all, or frame 0 for one image");
-  command->add_option("--place", options->cast.places, "X,Z[,HEADING] in metres and degrees, once for each avatar")
+  command->add_option(
+      "--body", options->cast.body,
+      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command
+      ->add_option("--motion", options->cast.motions,
+                   "motion packages: one for all avatars, or one for each")
+      ->expected(1)
+      ->take_all();
+  command->add_option("--frames", options->frames,
+                      "N, A:B or A:B:STEP (B excluded); default: all, or frame 0 for one image");
+  command
+      ->add_option("--place", options->cast.places,
+                   "X,Z[,HEADING] in metres and degrees, once for each avatar")
       ->expected(1)
       ->take_all();
   command->add_option("--spacing", options->cast.spacing_m, "metres between avatars side by side")
       ->check(CLI::Range(-1000.0f, 1000.0f))
       ->capture_default_str();
-  command->add_option("--camera", options->camera, "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
-  command->add_option("--follow", options->follow, "what an orbit's target does: smooth (goes along with the figures) or off (stays)")
+  command->add_option("--camera", options->camera,
+                      "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
+  command
+      ->add_option(
+          "--follow", options->follow,
+          "what an orbit's target does: smooth (goes along with the figures) or off (stays)")
       ->check(CLI::IsMember({"smooth", "off"}))
       ->capture_default_str();
-  command->add_option("--near", options->near_m, "metres; Gaussians nearer than this are culled; default 0.2")->check(CLI::PositiveNumber);
-  command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the camera's, or the avatar's golden frame's");
-  command->add_option("--background", options->background, "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha for images");
-  command->add_option("--fps", options->frames_per_second, "frames a second of the video; default: the motion's, divided by STEP")
+  command
+      ->add_option("--near", options->near_m,
+                   "metres; Gaussians nearer than this are culled; default 0.2")
       ->check(CLI::PositiveNumber);
-  command->add_option("--contact-sheet", options->contact_sheet, "also put evenly chosen frames into one PNG");
-  command->add_option("--columns", options->sheet.columns, "of the contact sheet")->check(CLI::Range(1u, 100u))->capture_default_str();
-  command->add_option("--tiles", options->sheet.tiles, "of the contact sheet")->check(CLI::Range(1u, 10000u))->capture_default_str();
+  command->add_option("--size", options->size,
+                      "WIDTHxHEIGHT; default: the camera's, or the avatar's golden frame's");
+  command->add_option("--background", options->background,
+                      "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha for images");
+  command
+      ->add_option("--fps", options->frames_per_second,
+                   "frames a second of the video; default: the motion's, divided by STEP")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--contact-sheet", options->contact_sheet,
+                      "also put evenly chosen frames into one PNG");
+  command->add_option("--columns", options->sheet.columns, "of the contact sheet")
+      ->check(CLI::Range(1u, 100u))
+      ->capture_default_str();
+  command->add_option("--tiles", options->sheet.tiles, "of the contact sheet")
+      ->check(CLI::Range(1u, 10000u))
+      ->capture_default_str();
   command->add_option("--sheet-shrink", options->sheet.shrink, "tiles are 1/N of a frame")
       ->check(CLI::Range(1u, 64u))
       ->capture_default_str();

@@ -1,5 +1,6 @@
-// figurine report: every speed-up as a point of error over run time, of avatars here and of samplers in sampler_report.cpp. One table of
-// dials; each setting is rendered for the same frames in turn and held against the reference setting's pictures.
+// figurine report: every speed-up as a point of error over run time, of avatars here and of
+// samplers in sampler_report.cpp. One table of dials; each setting is rendered for the same frames
+// in turn and held against the reference setting's pictures.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -41,49 +42,60 @@ struct Setting {
 
 struct Dial {
   std::string name, meaning;
-  std::optional<double> theoretical_order;  // error ~ value^order; none: settings to choose from, with no order between them
+  std::optional<double> theoretical_order;  // error ~ value^order; none: settings to choose from,
+                                            // with no order between them
   std::string theory;
   Knobs reference;
-  std::vector<Stage> stages;      // that the dial can make cheaper: their time is the cost that is plotted
+  std::vector<Stage>
+      stages;  // that the dial can make cheaper: their time is the cost that is plotted
   std::vector<Setting> settings;  // from coarse to fine
 };
 
 constexpr float kReferenceCut = 1e-7f;
 constexpr const char* kReferenceMeaning =
-    "the same renderer with the alpha cut at 1e-7: every contribution that float arithmetic can tell from nothing is blended. The "
+    "the same renderer with the alpha cut at 1e-7: every contribution that float arithmetic can "
+    "tell from nothing is blended. The "
     "transmittance stop at 1e-4 "
-    "and the dilation of 0.3 px^2 are part of the definition of the picture and the same everywhere.";
+    "and the dilation of 0.3 px^2 are part of the definition of the picture and the same "
+    "everywhere.";
 
 Dial alpha_cut_dial() {
-  Dial dial{
-      .name = "alpha cut",
-      .meaning = "contributions to a pixel with an alpha below this are skipped; it decides how far around its centre a Gaussian is drawn",
-      .theoretical_order = 1,
-      .theory =
-          "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is missing from the picture falls in proportion to the "
-          "cut.",
-      .reference = {.splat = {.alpha_cut = kReferenceCut}, .precision = {}},
-      .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve},
-      .settings = {}};
+  Dial dial{.name = "alpha cut",
+            .meaning =
+                "contributions to a pixel with an alpha below this are skipped; it decides how far "
+                "around its centre a Gaussian is drawn",
+            .theoretical_order = 1,
+            .theory =
+                "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is "
+                "missing from the picture falls in proportion to the "
+                "cut.",
+            .reference = {.splat = {.alpha_cut = kReferenceCut}, .precision = {}},
+            .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve},
+            .settings = {}};
   for (const int inverse : {16, 32, 64, 128, 255, 512, 1024, 4096, 16384}) {
     const double cut = 1.0 / inverse;
-    dial.settings.push_back({.label = "1/" + std::to_string(inverse),
-                             .value = cut,
-                             .is_default = static_cast<float>(cut) == kAlphaCut,
-                             .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)}, .precision = {}}});
+    dial.settings.push_back(
+        {.label = "1/" + std::to_string(inverse),
+         .value = cut,
+         .is_default = static_cast<float>(cut) == kAlphaCut,
+         .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)}, .precision = {}}});
   }
   return dial;
 }
 
-// Both settings at the reference's alpha cut, which costs the network nothing: what is left of the difference is the precision's own.
+// Both settings at the reference's alpha cut, which costs the network nothing: what is left of the
+// difference is the precision's own.
 Dial precision_dial() {
   constexpr SplatOptions kSplat{.alpha_cut = kReferenceCut};
   return {.name = "precision",
           .meaning =
-              "arithmetic of the network: q8 (int8 weights and activations) or f32, this dial's reference; the value is the step of a "
+              "arithmetic of the network: q8 (int8 weights and activations) or f32, this dial's "
+              "reference; the value is the step of a "
               "number that fills its range",
           .theoretical_order = std::nullopt,
-          .theory = "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the layers add their errors up.",
+          .theory =
+              "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the "
+              "layers add their errors up.",
           .reference = {.splat = kSplat, .precision = Precision::kFloat32},
           .stages = {Stage::kNetwork},
           .settings = {{.label = to_string(Precision::kFixedPoint),
@@ -121,7 +133,8 @@ struct Troupe {
   std::unique_ptr<Cast> cast;
 };
 
-Result<Troupe> assemble(const CastOptions& options, const RendererOptions& renderer_options, std::optional<Precision> precision) {
+Result<Troupe> assemble(const CastOptions& options, const RendererOptions& renderer_options,
+                        std::optional<Precision> precision) {
   Result<Cast> cast = Cast::load(options);
   if (!cast.ok()) return cast.status();
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
@@ -133,17 +146,25 @@ Result<Troupe> assemble(const CastOptions& options, const RendererOptions& rende
 // Draws frame number i of the run with any setting.
 class Studio {
  public:
-  // floats: for settings that ask for f32, where the first troupe has another precision; may be empty.
+  // floats: for settings that ask for f32, where the first troupe has another precision; may be
+  // empty.
   Studio(Troupe first, Troupe floats, std::vector<uint32_t> frames, std::vector<Camera> cameras)
-      : first_(std::move(first)), floats_(std::move(floats)), frames_(std::move(frames)), cameras_(std::move(cameras)) {}
+      : first_(std::move(first)),
+        floats_(std::move(floats)),
+        frames_(std::move(frames)),
+        cameras_(std::move(cameras)) {}
 
   Status draw(uint32_t i, const Knobs& knobs, RenderedFrame& picture) {
     Troupe& troupe = troupe_of(knobs);
-    const std::span<const FrameAvatar> posed = troupe.cast->moves() ? troupe.cast->pose(frames_[i % frames_.size()]) : troupe.cast->sway(i);
-    return troupe.renderer->render({.camera = cameras_[i % cameras_.size()], .avatars = posed, .splat = knobs.splat}, picture.target());
+    const std::span<const FrameAvatar> posed = troupe.cast->moves()
+                                                   ? troupe.cast->pose(frames_[i % frames_.size()])
+                                                   : troupe.cast->sway(i);
+    return troupe.renderer->render(
+        {.camera = cameras_[i % cameras_.size()], .avatars = posed, .splat = knobs.splat},
+        picture.target());
   }
-  Status measure(uint32_t i, const Setting& setting, const RenderedFrame& truth, RenderedFrame& u8, RenderedFrame& f32,
-                 Measurement& result) {
+  Status measure(uint32_t i, const Setting& setting, const RenderedFrame& truth, RenderedFrame& u8,
+                 RenderedFrame& f32, Measurement& result) {
     FIG_RETURN_IF_ERROR(draw(i, setting.knobs, f32));
     add_foreground_error(truth.f32, f32.f32, result.error);
     const uint64_t start_ns = now_ns();  // timed by itself, into the 8-bit picture that a user sees
@@ -154,7 +175,9 @@ class Studio {
   ImageSize size() const { return {cameras_[0].width_px, cameras_[0].height_px}; }
 
  private:
-  Troupe& troupe_of(const Knobs& knobs) { return knobs.precision == Precision::kFloat32 && floats_.renderer != nullptr ? floats_ : first_; }
+  Troupe& troupe_of(const Knobs& knobs) {
+    return knobs.precision == Precision::kFloat32 && floats_.renderer != nullptr ? floats_ : first_;
+  }
 
   Troupe first_, floats_;
   std::vector<uint32_t> frames_;
@@ -171,26 +194,31 @@ Box foreground_box(const ports::ImageF32& image) {
   for (uint32_t y = 0; y < image.height_px; ++y) {
     for (uint32_t x = 0; x < image.width_px; ++x) {
       if (!(image.at(x, y)[3] > 0.02f)) continue;
-      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
+      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1),
+             std::max(box.y1, y + 1)};
     }
   }
   if (box.x1 <= box.x0) return {0, 0, image.width_px, image.height_px};
   constexpr uint32_t kRoom = 8;
-  return {box.x0 - std::min(box.x0, kRoom), box.y0 - std::min(box.y0, kRoom), std::min(box.x1 + kRoom, image.width_px),
-          std::min(box.y1 + kRoom, image.height_px)};
+  return {box.x0 - std::min(box.x0, kRoom), box.y0 - std::min(box.y0, kRoom),
+          std::min(box.x1 + kRoom, image.width_px), std::min(box.y1 + kRoom, image.height_px)};
 }
 
 // The box of grey + gain * (picture - truth) over grey; gain 0 shows the truth itself over grey.
-Result<std::vector<std::byte>> draw_difference(const ports::ImageF32& truth, const ports::ImageF32& picture, const Box& box, float gain) {
+Result<std::vector<std::byte>> draw_difference(const ports::ImageF32& truth,
+                                               const ports::ImageF32& picture, const Box& box,
+                                               float gain) {
   ports::ImageU8 image(box.x1 - box.x0, box.y1 - box.y0, 3);
   for (uint32_t y = box.y0; y < box.y1; ++y) {
     for (uint32_t x = box.x0; x < box.x1; ++x) {
       const float* t = truth.at(x, y);
       const float* p = picture.at(x, y);
       for (int c = 0; c < 3; ++c) {
-        const float over_truth = (t[c] - 0.5f) * t[3], difference = (p[c] - 0.5f) * p[3] - over_truth;
+        const float over_truth = (t[c] - 0.5f) * t[3],
+                    difference = (p[c] - 0.5f) * p[3] - over_truth;
         const float value = 0.5f + (gain == 0 ? over_truth : gain * difference);
-        image.at(x - box.x0, y - box.y0)[c] = static_cast<uint8_t>(std::lround(std::clamp(value, 0.0f, 1.0f) * 255));
+        image.at(x - box.x0, y - box.y0)[c] =
+            static_cast<uint8_t>(std::lround(std::clamp(value, 0.0f, 1.0f) * 255));
       }
     }
   }
@@ -198,9 +226,11 @@ Result<std::vector<std::byte>> draw_difference(const ports::ImageF32& truth, con
 }
 
 // The truth and the differences of a coarse setting, the default and a fine one, for one frame.
-Status draw_pictures(Studio& studio, uint32_t frame, const Dial& dial, std::vector<ReportPicture>& pictures) {
+Status draw_pictures(Studio& studio, uint32_t frame, const Dial& dial,
+                     std::vector<ReportPicture>& pictures) {
   constexpr float kGain = 32;
-  RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32), picture(studio.size(), PixelFormat::kRgbaF32);
+  RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32),
+      picture(studio.size(), PixelFormat::kRgbaF32);
   FIG_RETURN_IF_ERROR(studio.draw(frame, dial.reference, truth));
   const Box box = foreground_box(truth.f32);
   Result<std::vector<std::byte>> png = draw_difference(truth.f32, truth.f32, box, 0);
@@ -212,7 +242,9 @@ Status draw_pictures(Studio& studio, uint32_t frame, const Dial& dial, std::vect
     FIG_RETURN_IF_ERROR(studio.draw(frame, setting.knobs, picture));
     png = draw_difference(truth.f32, picture.f32, box, kGain);
     if (!png.ok()) return png.status();
-    pictures.push_back({dial.name + " " + setting.label + (setting.is_default ? " (default)" : "") + ": difference x 32", std::move(*png)});
+    pictures.push_back({dial.name + " " + setting.label + (setting.is_default ? " (default)" : "") +
+                            ": difference x 32",
+                        std::move(*png)});
   }
   return {};
 }
@@ -221,8 +253,10 @@ nlohmann::ordered_json finite_or_null(double value) {
   return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
 }
 
-// Slope of log error over log value by least squares; null where fewer than two settings have an error.
-nlohmann::ordered_json overall_order(const Dial& dial, const std::vector<Measurement>& measurements) {
+// Slope of log error over log value by least squares; null where fewer than two settings have an
+// error.
+nlohmann::ordered_json overall_order(const Dial& dial,
+                                     const std::vector<Measurement>& measurements) {
   double n = 0, x = 0, y = 0, xx = 0, xy = 0;
   for (size_t s = 0; s < dial.settings.size(); ++s) {
     if (!(measurements[s].error.squared > 0)) continue;
@@ -230,11 +264,15 @@ nlohmann::ordered_json overall_order(const Dial& dial, const std::vector<Measure
     n += 1, x += u, y += v, xx += u * u, xy += u * v;
   }
   const double determinant = n * xx - x * x;
-  return n >= 2 && determinant > 0 ? nlohmann::ordered_json((n * xy - x * y) / determinant) : nlohmann::ordered_json();
+  return n >= 2 && determinant > 0 ? nlohmann::ordered_json((n * xy - x * y) / determinant)
+                                   : nlohmann::ordered_json();
 }
 
 nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement>& measurements) {
-  nlohmann::ordered_json json = {{"name", dial.name}, {"meaning", dial.meaning}, {"theoretical_order", nullptr}, {"theory", dial.theory}};
+  nlohmann::ordered_json json = {{"name", dial.name},
+                                 {"meaning", dial.meaning},
+                                 {"theoretical_order", nullptr},
+                                 {"theory", dial.theory}};
   if (dial.theoretical_order) json["theoretical_order"] = *dial.theoretical_order;
   json["observed_order"] = overall_order(dial, measurements);
   json["stages"] = nlohmann::ordered_json::array();
@@ -242,16 +280,17 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
   json["settings"] = nlohmann::ordered_json::array();
   for (size_t s = 0; s < dial.settings.size(); ++s) {
     const Measurement& m = measurements[s];
-    nlohmann::ordered_json row = {
-        {"label", dial.settings[s].label}, {"value", dial.settings[s].value}, {"default", dial.settings[s].is_default}};
+    nlohmann::ordered_json row = {{"label", dial.settings[s].label},
+                                  {"value", dial.settings[s].value},
+                                  {"default", dial.settings[s].is_default}};
     row["psnr_db"] = finite_or_null(m.error.psnr_db());
     row["rmse"] = m.error.rmse();
     row["largest"] = m.error.largest;
     // The slope of log error over log value from the coarser neighbour to this setting.
     row["observed_order"] = nullptr;
     if (s > 0 && m.error.squared > 0 && measurements[s - 1].error.squared > 0) {
-      row["observed_order"] =
-          std::log(measurements[s - 1].error.rmse() / m.error.rmse()) / std::log(dial.settings[s - 1].value / dial.settings[s].value);
+      row["observed_order"] = std::log(measurements[s - 1].error.rmse() / m.error.rmse()) /
+                              std::log(dial.settings[s - 1].value / dial.settings[s].value);
     }
     const Summary cost_ms = m.log.stages_ms(dial.stages);
     row["cost_ms"] = {{"median", cost_ms.median}, {"p90", cost_ms.p90}};
@@ -264,9 +303,12 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
 
 Status run_report(const ReportOptions& options) {
   // Whatever else it is, or is not, is said by what loads an avatar.
-  if (const auto loaded = load_package(options.cast.avatars[0]); loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
-    return run_sampler_report(**loaded,
-                              {.body = options.cast.body, .seeds = options.seeds, .output = options.output, .json = options.device.json});
+  if (const auto loaded = load_package(options.cast.avatars[0]);
+      loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
+    return run_sampler_report(**loaded, {.body = options.cast.body,
+                                         .seeds = options.seeds,
+                                         .output = options.output,
+                                         .json = options.device.json});
   }
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
@@ -276,18 +318,22 @@ Status run_report(const ReportOptions& options) {
     if (!size.ok()) return size.status();
     rig.size = *size;
   }
-  Result<Troupe> first = assemble(options.cast, *renderer_options, options.device.network_precision());
+  Result<Troupe> first =
+      assemble(options.cast, *renderer_options, options.device.network_precision());
   if (!first.ok()) return first.status();
   Cast& cast = *first->cast;
-  const bool both = options.device.precision.empty() && cast.holds(Precision::kFloat32) && cast.holds(Precision::kFixedPoint);
-  Result<Troupe> floats = both ? assemble(options.cast, *renderer_options, Precision::kFloat32) : Troupe{};
+  const bool both = options.device.precision.empty() && cast.holds(Precision::kFloat32) &&
+                    cast.holds(Precision::kFixedPoint);
+  Result<Troupe> floats =
+      both ? assemble(options.cast, *renderer_options, Precision::kFloat32) : Troupe{};
   if (!floats.ok()) return floats.status();
   // Evenly over the whole motion.
   const Result<std::vector<uint32_t>> all = cast.frames({});
   if (!all.ok()) return all.status();
   std::vector<uint32_t> frames;
   for (uint32_t i = 0; i < std::min<size_t>(options.frames, all->size()); ++i) {
-    frames.push_back((*all)[size_t(i) * all->size() / std::min<size_t>(options.frames, all->size())]);
+    frames.push_back(
+        (*all)[size_t(i) * all->size() / std::min<size_t>(options.frames, all->size())]);
   }
   Result<std::vector<Camera>> cameras = place_cameras(rig, frames, cast, *first->renderer);
   if (!cameras.ok()) return cameras.status();
@@ -297,17 +343,19 @@ Status run_report(const ReportOptions& options) {
   const std::vector<Dial> table = dials(both);
   std::vector<std::vector<Measurement>> measurements;
   for (const Dial& dial : table) measurements.emplace_back(dial.settings.size());
-  RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32), f32(studio.size(), PixelFormat::kRgbaF32),
-      u8(studio.size(), PixelFormat::kRgba8);
+  RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32),
+      f32(studio.size(), PixelFormat::kRgbaF32), u8(studio.size(), PixelFormat::kRgba8);
   Progress progress("report", options.frames);
   for (uint32_t i = 0; i < options.frames; ++i) {
     for (size_t d = 0; d < table.size(); ++d) {
       FIG_RETURN_IF_ERROR(studio.draw(i, table[d].reference, truth));
       const size_t count = table[d].settings.size();
-      for (size_t turn = 0; turn < count; ++turn) {  // another setting begins each round: nobody is always first after the reference
+      for (size_t turn = 0; turn < count; ++turn) {  // another setting begins each round: nobody is
+                                                     // always first after the reference
         FIG_RETURN_IF_ERROR(check_interrupt());
         const size_t s = (i + turn) % count;
-        FIG_RETURN_IF_ERROR(studio.measure(i, table[d].settings[s], truth, u8, f32, measurements[d][s]));
+        FIG_RETURN_IF_ERROR(
+            studio.measure(i, table[d].settings[s], truth, u8, f32, measurements[d][s]));
       }
     }
     progress.update(i + 1);
@@ -317,17 +365,22 @@ Status run_report(const ReportOptions& options) {
   json["date"] = date_utc();
   json["machine"] = json_machine(options.device, renderer_options->threads, precision);
   json["avatar"] = options.cast.avatars[0];
-  json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(options.cast.motions[0]);
+  json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json()
+                                                : nlohmann::ordered_json(options.cast.motions[0]);
   json["frames"] = options.frames;
   json["size"] = {studio.size().width_px, studio.size().height_px};
   json["reference"] = {{"alpha_cut", kReferenceCut}, {"meaning", kReferenceMeaning}};
   json["metric"] =
-      "PSNR over pixels whose alpha in the reference exceeds 0.5, on stored sRGB values in float over mid-grey, squared errors pooled over "
+      "PSNR over pixels whose alpha in the reference exceeds 0.5, on stored sRGB values in float "
+      "over mid-grey, squared errors pooled over "
       "all "
       "frames; largest is the largest difference of one value there";
-  json["timing"] = "median over the frames, settings taking turns within each frame; every frame has a fresh pose and a run of the network";
+  json["timing"] =
+      "median over the frames, settings taking turns within each frame; every frame has a fresh "
+      "pose and a run of the network";
   json["dials"] = nlohmann::ordered_json::array();
-  for (size_t d = 0; d < table.size(); ++d) json["dials"].push_back(dial_json(table[d], measurements[d]));
+  for (size_t d = 0; d < table.size(); ++d)
+    json["dials"].push_back(dial_json(table[d], measurements[d]));
   std::vector<ReportPicture> pictures;
   FIG_RETURN_IF_ERROR(draw_pictures(studio, options.frames / 2, table[0], pictures));
   FIG_RETURN_IF_ERROR(write_report(options.output, json, report_html(json, pictures)));
@@ -339,15 +392,21 @@ Status run_report(const ReportOptions& options) {
 
 Command add_report_command(CLI::App& app) {
   auto options = std::make_shared<ReportOptions>();
-  CLI::App* command = app.add_subcommand("report", "Plots error against run time: report.json and report.html");
+  CLI::App* command =
+      app.add_subcommand("report", "Plots error against run time: report.json and report.html");
   options->cast.avatars.resize(1);
   command
       ->add_option("avatar", options->cast.avatars[0],
-                   "avatar or sampler package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+                   "avatar or sampler package (.fgn), or a member of a population "
+                   "(people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option("--body", options->cast.body,
-                      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
-  command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose, swaying")->expected(1);
+  command->add_option(
+      "--body", options->cast.body,
+      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command
+      ->add_option("--motion", options->cast.motions,
+                   "motion package; default: the golden pose, swaying")
+      ->expected(1);
   command->add_option("--frames", options->frames, "measured frames, evenly over the motion")
       ->check(CLI::Range(1u, 10000u))
       ->capture_default_str();
@@ -355,7 +414,8 @@ Command add_report_command(CLI::App& app) {
       ->check(CLI::Range(1u, 1000u))
       ->capture_default_str();
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the golden frame's");
-  command->add_option("-o,--output", options->output, "folder for report.json and report.html")->required();
+  command->add_option("-o,--output", options->output, "folder for report.json and report.html")
+      ->required();
   options->device.add_to(*command);
   return {command, [options] { return run_report(*options); }};
 }

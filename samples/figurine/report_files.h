@@ -9,6 +9,7 @@
 namespace figurine::samples {
 
 // DIR/report.json and DIR/report.html, both or none.
-Status write_report(const std::string& folder, const nlohmann::ordered_json& json, const std::string& html);
+Status write_report(const std::string& folder, const nlohmann::ordered_json& json,
+                    const std::string& html);
 
 }  // namespace figurine::samples

@@ -58,8 +58,11 @@ std::string base64(const std::vector<std::byte>& bytes) {
   text.reserve((bytes.size() + 2) / 3 * 4);
   for (size_t i = 0; i < bytes.size(); i += 3) {
     uint32_t group = 0;
-    for (size_t k = 0; k < 3; ++k) group = group << 8 | (i + k < bytes.size() ? static_cast<uint32_t>(bytes[i + k]) : 0);
-    for (size_t k = 0; k < 4; ++k) text += k <= std::min<size_t>(3, bytes.size() - i) ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+    for (size_t k = 0; k < 3; ++k)
+      group = group << 8 | (i + k < bytes.size() ? static_cast<uint32_t>(bytes[i + k]) : 0);
+    for (size_t k = 0; k < 4; ++k)
+      text +=
+          k <= std::min<size_t>(3, bytes.size() - i) ? kDigits[group >> (18 - 6 * k) & 63] : '=';
   }
   return text;
 }
@@ -69,66 +72,84 @@ std::string fact(const std::string& name, const std::string& value) {
 }
 
 std::string capitalised(std::string text) {
-  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
+  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z')
+    text[0] = static_cast<char>(text[0] - 'a' + 'A');
   return text;
 }
 
 std::string cell(const std::string& text) { return "<td>" + text + "</td>"; }
 
-// A dial of the renderer counts the blends of frames, one of a sampler the evaluations of its denoiser.
+// A dial of the renderer counts the blends of frames, one of a sampler the evaluations of its
+// denoiser.
 bool blends_are_counted(const Json& dial) { return dial["settings"][0]["work"].contains("blends"); }
 
 std::string plots_of(const Json& dial) {
   // Without an order between the settings there is no curve to draw; the table says all.
-  if (dial["theoretical_order"].is_null()) return "<p class=\"words\">" + escape_html(dial["theory"].get<std::string>()) + "</p>\n";
+  if (dial["theoretical_order"].is_null())
+    return "<p class=\"words\">" + escape_html(dial["theory"].get<std::string>()) + "</p>\n";
   std::string stages;
-  for (const Json& stage : dial["stages"]) stages += (stages.empty() ? "" : ", ") + stage.get<std::string>();
+  for (const Json& stage : dial["stages"])
+    stages += (stages.empty() ? "" : ", ") + stage.get<std::string>();
   Plot time{.x = {"median time of " + stages + ", ms"}, .y = {"PSNR to the reference, dB"}};
   const bool of_frames = blends_are_counted(dial);
-  Plot work{.x = {of_frames ? "blends a frame" : "multiply-accumulates", true}, .y = {"PSNR to the reference, dB"}};
+  Plot work{.x = {of_frames ? "blends a frame" : "multiply-accumulates", true},
+            .y = {"PSNR to the reference, dB"}};
   Plot order{.x = {dial["name"].get<std::string>(), true}, .y = {"rms error", true}};
   for (const Json& setting : dial["settings"]) {
-    if (setting["psnr_db"].is_null()) continue;  // no error at all has no place on a scale of decibels
+    if (setting["psnr_db"].is_null())
+      continue;  // no error at all has no place on a scale of decibels
     const std::string label = setting["label"];
     const bool is_default = setting["default"];
     const double psnr = setting["psnr_db"];
     time.points.push_back({setting["cost_ms"]["median"], psnr, label, is_default});
-    work.points.push_back({setting["work"][of_frames ? "blends" : "macs"], psnr, label, is_default});
+    work.points.push_back(
+        {setting["work"][of_frames ? "blends" : "macs"], psnr, label, is_default});
     order.points.push_back({setting["value"], setting["rmse"], label, is_default});
     if (is_default && dial["theoretical_order"].get<double>() > 0) {
       const double p = dial["theoretical_order"], v = setting["value"], e = setting["rmse"];
-      order.lines.push_back({{v / 8, e / std::pow(8, p), "", false}, {v * 8, e * std::pow(8, p), "", false}, "order " + format("%g", p)});
+      order.lines.push_back({{v / 8, e / std::pow(8, p), "", false},
+                             {v * 8, e * std::pow(8, p), "", false},
+                             "order " + format("%g", p)});
     }
   }
   const auto figure = [](const Plot& plot, const std::string& caption) {
-    return "<figure>" + svg_plot(plot) + "<figcaption>" + escape_html(caption) + "</figcaption></figure>\n";
+    return "<figure>" + svg_plot(plot) + "<figcaption>" + escape_html(caption) +
+           "</figcaption></figure>\n";
   };
   return "<div class=\"plots\">\n" +
-         figure(
-             time,
-             "Error over the time of the stages that the dial touches: up and to the left is better. Times move with the machine's mood.") +
-         figure(work, std::string("Error over work: ") + (of_frames ? "blends" : "operations") + " do not depend on the machine.") +
-         figure(order, "Convergence: the slope is the observed order; dashed, the theoretical one through the default.") +
-         "<div class=\"words\"><p><b>In theory.</b> " + escape_html(dial["theory"].get<std::string>()) + " Order " +
+         figure(time,
+                "Error over the time of the stages that the dial touches: up and to the left is "
+                "better. Times move with the machine's mood.") +
+         figure(work, std::string("Error over work: ") + (of_frames ? "blends" : "operations") +
+                          " do not depend on the machine.") +
+         figure(order,
+                "Convergence: the slope is the observed order; dashed, the theoretical one through "
+                "the default.") +
+         "<div class=\"words\"><p><b>In theory.</b> " +
+         escape_html(dial["theory"].get<std::string>()) + " Order " +
          format("%g", dial["theoretical_order"]) + ".</p><p><b>Observed.</b> " +
          (dial["observed_order"].is_null() ? "No error to speak of."
-                                           : "Order " + format("%.2f", dial["observed_order"]) + ", by least squares over all settings.") +
+                                           : "Order " + format("%.2f", dial["observed_order"]) +
+                                                 ", by least squares over all settings.") +
          "</p></div>" + "</div>\n";
 }
 
 std::string table_of(const Json& dial) {
   const bool of_frames = blends_are_counted(dial);
-  std::string html =
-      "<table><tr><th>" + escape_html(dial["name"].get<std::string>()) +
-      "</th><th>PSNR, dB</th><th>rms error</th><th>largest</th><th>observed order</th><th>its stages, ms</th><th>p90, ms</th>" +
-      (of_frames ? "<th>whole frame, ms</th><th>blends</th><th>pairs</th>" : "") + "<th>GMAC</th></tr>\n";
+  std::string html = "<table><tr><th>" + escape_html(dial["name"].get<std::string>()) +
+                     "</th><th>PSNR, dB</th><th>rms error</th><th>largest</th><th>observed "
+                     "order</th><th>its stages, ms</th><th>p90, ms</th>" +
+                     (of_frames ? "<th>whole frame, ms</th><th>blends</th><th>pairs</th>" : "") +
+                     "<th>GMAC</th></tr>\n";
   for (const Json& setting : dial["settings"]) {
     const Json& work = setting["work"];
     html += setting["default"].get<bool>() ? "<tr class=\"default\">" : "<tr>";
-    html += cell(escape_html(setting["label"].get<std::string>()) + (setting["default"].get<bool>() ? " (default)" : ""));
+    html += cell(escape_html(setting["label"].get<std::string>()) +
+                 (setting["default"].get<bool>() ? " (default)" : ""));
     html += cell(setting["psnr_db"].is_null() ? "equal" : format("%.2f", setting["psnr_db"]));
     html += cell(format("%.2e", setting["rmse"])) + cell(format("%.2e", setting["largest"]));
-    html += cell(setting["observed_order"].is_null() ? "" : format("%.2f", setting["observed_order"]));
+    html +=
+        cell(setting["observed_order"].is_null() ? "" : format("%.2f", setting["observed_order"]));
     const Json& cost = setting["cost_ms"];
     html += cell(format("%.2f", cost["median"])) + cell(format("%.2f", cost["p90"]));
     if (of_frames) {
@@ -146,43 +167,57 @@ std::string table_of(const Json& dial) {
 std::string report_html(const Json& report, const std::vector<ReportPicture>& pictures) {
   const Json& machine = report["machine"];
   const bool of_sampler = report.contains("sampler");
-  const auto text = [](const Json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); };
+  const auto text = [](const Json& value) {
+    return value.is_string() ? value.get<std::string>() : value.dump();
+  };
   std::string html =
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">";
-  html += "<title>figurine: error against run time</title><style>" + std::string(kStyle) + "</style></head><body>\n";
-  html += "<h1>Error against run time</h1>\n<p class=\"soft\">What each dial of the " + std::string(of_sampler ? "sampler" : "renderer") +
-          " costs in quality and saves in time, for one " + (of_sampler ? "package" : "avatar") + ".</p>\n";
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width\">";
+  html += "<title>figurine: error against run time</title><style>" + std::string(kStyle) +
+          "</style></head><body>\n";
+  html += "<h1>Error against run time</h1>\n<p class=\"soft\">What each dial of the " +
+          std::string(of_sampler ? "sampler" : "renderer") +
+          " costs in quality and saves in time, for one " + (of_sampler ? "package" : "avatar") +
+          ".</p>\n";
   html += "<dl class=\"facts\">\n";
   const std::string size = text(report["size"][0]) + " x " + text(report["size"][1]);
   if (of_sampler) {
-    html += fact("Sampler", text(report["sampler"])) + fact("People", text(report["seeds"]) + " seeds, pictures of " + size);
+    html += fact("Sampler", text(report["sampler"])) +
+            fact("People", text(report["seeds"]) + " seeds, pictures of " + size);
   } else {
     html += fact("Avatar", text(report["avatar"]));
-    html += fact("Motion", report["motion"].is_null() ? "golden pose, swaying" : text(report["motion"]));
+    html += fact("Motion",
+                 report["motion"].is_null() ? "golden pose, swaying" : text(report["motion"]));
     html += fact("Frames", text(report["frames"]) + " of " + size);
   }
-  html += fact("CPU", text(machine["cpu"])) + fact("Threads", text(machine["threads"]) + " on " + text(machine["cpus"]) + " CPUs");
+  html += fact("CPU", text(machine["cpu"])) +
+          fact("Threads", text(machine["threads"]) + " on " + text(machine["cpus"]) + " CPUs");
   html += fact("Arithmetic", text(machine["precision"]) + ", " + text(machine["isa"]) + " kernels");
-  html += fact("Made", text(report["date"])) + fact("By", "figurine " + text(report["version"])) + "</dl>\n";
+  html += fact("Made", text(report["date"])) + fact("By", "figurine " + text(report["version"])) +
+          "</dl>\n";
   for (const Json& dial : report["dials"]) {
-    html +=
-        "<h2>" + escape_html(capitalised(text(dial["name"]))) + "</h2>\n<p>" + escape_html(capitalised(text(dial["meaning"]))) + ".</p>\n";
+    html += "<h2>" + escape_html(capitalised(text(dial["name"]))) + "</h2>\n<p>" +
+            escape_html(capitalised(text(dial["meaning"]))) + ".</p>\n";
     html += plots_of(dial) + table_of(dial);
   }
   if (!pictures.empty()) {
     html += "<h2>Where the error is</h2>\n<p>" +
-            std::string(of_sampler ? "One person, as it becomes one." : "The middle frame. Differences are shown around mid-grey.") +
+            std::string(of_sampler ? "One person, as it becomes one."
+                                   : "The middle frame. Differences are shown around mid-grey.") +
             "</p>\n<div class=\"pictures\">\n";
     for (const ReportPicture& picture : pictures) {
-      html += "<figure><img alt=\"" + escape_html(picture.caption) + "\" src=\"data:image/png;base64," + base64(picture.png) +
-              "\"><figcaption>" + escape_html(picture.caption) + "</figcaption></figure>\n";
+      html += "<figure><img alt=\"" + escape_html(picture.caption) +
+              "\" src=\"data:image/png;base64," + base64(picture.png) + "\"><figcaption>" +
+              escape_html(picture.caption) + "</figcaption></figure>\n";
     }
     html += "</div>\n";
   }
-  html += "<h2>How the numbers were made</h2>\n<p><b>Reference:</b> " + escape_html(text(report["reference"]["meaning"])) +
-          "</p>\n<p><b>Error:</b> " + escape_html(text(report["metric"])) + ".</p>\n<p><b>Time:</b> " +
+  html += "<h2>How the numbers were made</h2>\n<p><b>Reference:</b> " +
+          escape_html(text(report["reference"]["meaning"])) + "</p>\n<p><b>Error:</b> " +
+          escape_html(text(report["metric"])) + ".</p>\n<p><b>Time:</b> " +
           escape_html(text(report["timing"])) +
-          ".</p>\n<p class=\"soft\">The same figures, and all stages, are in report.json beside this page.</p>\n</body></html>\n";
+          ".</p>\n<p class=\"soft\">The same figures, and all stages, are in report.json beside "
+          "this page.</p>\n</body></html>\n";
   return html;
 }
 

@@ -1,4 +1,5 @@
-// The page of figurine report: one self-contained HTML file, no script, no network. Takes the report as JSON (docs/json.md) and draws it.
+// The page of figurine report: one self-contained HTML file, no script, no network. Takes the
+// report as JSON (docs/json.md) and draws it.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -13,6 +14,7 @@ struct ReportPicture {
   std::vector<std::byte> png;
 };
 
-std::string report_html(const nlohmann::ordered_json& report, const std::vector<ReportPicture>& pictures);
+std::string report_html(const nlohmann::ordered_json& report,
+                        const std::vector<ReportPicture>& pictures);
 
 }  // namespace figurine::samples

@@ -12,7 +12,8 @@ namespace {
 constexpr double kRadians = 3.14159265358979323846 / 180;
 constexpr size_t kFramingFrames = 5;    // posed to see how large the figures are
 constexpr double kFollowSigma_s = 0.4;  // smoothing of the followed path: about a step
-constexpr float kOpacitySeen = 0.05f;   // fainter Gaussians do not decide what must be in the picture
+constexpr float kOpacitySeen =
+    0.05f;  // fainter Gaussians do not decide what must be in the picture
 constexpr float kDefaultTurn_deg = 25;  // a three-quarter view shows more shape than a frontal one
 constexpr float kDefaultElevation_deg = 6;
 constexpr float kDefaultFov_deg = 35;
@@ -43,7 +44,8 @@ float mean_heading_deg(const Cast& cast) {
 }
 
 // Centres of the Gaussians that can be seen in a few of the frames, relative to path.
-Result<std::vector<Point>> sample_points(std::span<const uint32_t> frames, std::span<const std::array<float, 2>> path, Cast& cast,
+Result<std::vector<Point>> sample_points(std::span<const uint32_t> frames,
+                                         std::span<const std::array<float, 2>> path, Cast& cast,
                                          Renderer& renderer) {
   std::vector<Point> points;
   const size_t samples = std::min(kFramingFrames, frames.size());
@@ -64,7 +66,9 @@ Result<std::vector<Point>> sample_points(std::span<const uint32_t> frames, std::
 
 }  // namespace
 
-Result<std::vector<Camera>> place_cameras(const RigOptions& options, std::span<const uint32_t> frames, Cast& cast, Renderer& renderer) {
+Result<std::vector<Camera>> place_cameras(const RigOptions& options,
+                                          std::span<const uint32_t> frames, Cast& cast,
+                                          Renderer& renderer) {
   const Camera& golden = cast.avatar(0).avatar.golden.camera;
   if (options.camera.fixed) {
     Camera camera = *options.camera.fixed;
@@ -78,10 +82,12 @@ Result<std::vector<Camera>> place_cameras(const RigOptions& options, std::span<c
   }
   const ImageSize size = options.size.value_or(ImageSize{golden.width_px, golden.height_px});
   const double aspect = static_cast<double>(size.width_px) / size.height_px;
-  std::vector<std::array<float, 2>> path(frames.size(), {0, 0});  // an orbit that stays sees the path in world coordinates
+  std::vector<std::array<float, 2>> path(
+      frames.size(), {0, 0});  // an orbit that stays sees the path in world coordinates
   if (options.follow)
     path =
-        smooth_path(ground_path(frames, cast), kFollowSigma_s * cast.frames_per_second() / (frames.size() > 1 ? frames[1] - frames[0] : 1));
+        smooth_path(ground_path(frames, cast), kFollowSigma_s * cast.frames_per_second() /
+                                                   (frames.size() > 1 ? frames[1] - frames[0] : 1));
   const Result<std::vector<Point>> points = sample_points(frames, path, cast, renderer);
   if (!points.ok()) return points.status();
 

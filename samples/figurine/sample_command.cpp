@@ -43,26 +43,32 @@ Result<Portrait> draw(const Avatar& avatar, const Package& body, Precision preci
   const Result<AvatarId> id = (*renderer)->add_avatar(avatar, body, precision);
   if (!id.ok()) return id.status();
   const GoldenFrame& golden = avatar.golden;
-  Portrait portrait{RenderedFrame({golden.camera.width_px, golden.camera.height_px}, PixelFormat::kRgba8), 0};
-  const FrameAvatar posed[] = {{.avatar = *id, .pose = {golden.root_translation_m, golden.rotations}}};
-  FIG_RETURN_IF_ERROR(
-      (*renderer)->render({.camera = golden.camera, .avatars = posed, .background = golden.background}, portrait.frame.target()));
+  Portrait portrait{
+      RenderedFrame({golden.camera.width_px, golden.camera.height_px}, PixelFormat::kRgba8), 0};
+  const FrameAvatar posed[] = {
+      {.avatar = *id, .pose = {golden.root_translation_m, golden.rotations}}};
+  FIG_RETURN_IF_ERROR((*renderer)->render(
+      {.camera = golden.camera, .avatars = posed, .background = golden.background},
+      portrait.frame.target()));
   portrait.memory_bytes = (*renderer)->memory_bytes();
   return portrait;
 }
 
-// Draws what the denoiser believes in after every step: one picture each, and all of them in a strip. Nothing is there before all is.
+// Draws what the denoiser believes in after every step: one picture each, and all of them in a
+// strip. Nothing is there before all is.
 class Strip final : public AvatarSampler::Trace {
  public:
-  static Result<std::unique_ptr<Strip>> create(const std::string& folder, const Sampler& sampler, const Package& body, uint32_t steps) {
+  static Result<std::unique_ptr<Strip>> create(const std::string& folder, const Sampler& sampler,
+                                               const Package& body, uint32_t steps) {
     std::error_code error;
     std::filesystem::create_directories(folder, error);
     if (error) return Status(StatusCode::kIo, folder + ": cannot be created: " + error.message());
     const ImageSize size{sampler.golden.camera.width_px, sampler.golden.camera.height_px};
-    Result<std::unique_ptr<FrameSink>> sink =
-        FrameSink::create(folder + "/step_%04d.png", {.size = size, .frame_count = steps, .opaque = true});
+    Result<std::unique_ptr<FrameSink>> sink = FrameSink::create(
+        folder + "/step_%04d.png", {.size = size, .frame_count = steps, .opaque = true});
     if (!sink.ok()) return sink.status();
-    Result<ContactSheet> sheet = ContactSheet::create({.frame_size = size, .frame_count = steps, .columns = 10, .tiles = 10});
+    Result<ContactSheet> sheet = ContactSheet::create(
+        {.frame_size = size, .frame_count = steps, .columns = 10, .tiles = 10});
     if (!sheet.ok()) return sheet.status();
     return std::unique_ptr<Strip>(new Strip(folder, body, std::move(*sink), std::move(*sheet)));
   }
@@ -81,8 +87,12 @@ class Strip final : public AvatarSampler::Trace {
   }
 
  private:
-  Strip(std::string folder, const Package& body, std::unique_ptr<FrameSink> sink, ContactSheet sheet)
-      : folder_(std::move(folder)), body_(&body), sink_(std::move(sink)), sheet_(std::move(sheet)) {}
+  Strip(std::string folder, const Package& body, std::unique_ptr<FrameSink> sink,
+        ContactSheet sheet)
+      : folder_(std::move(folder)),
+        body_(&body),
+        sink_(std::move(sink)),
+        sheet_(std::move(sheet)) {}
 
   std::string folder_;
   const Package* body_;
@@ -90,8 +100,12 @@ class Strip final : public AvatarSampler::Trace {
   ContactSheet sheet_;
 };
 
-uint32_t steps_of(const SampleRequest& request, const Sampler& sampler) { return request.steps == 0 ? sampler.steps : request.steps; }
-SolverMethod method_of(const SampleRequest& request, const Sampler& sampler) { return request.method.value_or(sampler.method); }
+uint32_t steps_of(const SampleRequest& request, const Sampler& sampler) {
+  return request.steps == 0 ? sampler.steps : request.steps;
+}
+SolverMethod method_of(const SampleRequest& request, const Sampler& sampler) {
+  return request.method.value_or(sampler.method);
+}
 
 // The sampler's, with what makes this avatar this avatar.
 Provenance provenance_of(const LoadedPackage& sampler, const SampleRequest& request) {
@@ -116,9 +130,12 @@ std::string default_name(const Sampler& sampler, const SampleRequest& request) {
   return request.mix == 0 ? seed : std::format("{}_to_{}_{}", seed, request.to, request.mix);
 }
 
-// Completes the avatar and gives its package's bytes: golden frame by this device, budget, floats and integers as asked for.
-Result<std::vector<std::byte>> pack(const SampleOptions& options, const LoadedPackage& sampler, const Package& body, Avatar avatar) {
-  const Result<Portrait> portrait = draw(avatar, body, options.precision == "f32" ? Precision::kFloat32 : Precision::kFixedPoint);
+// Completes the avatar and gives its package's bytes: golden frame by this device, budget, floats
+// and integers as asked for.
+Result<std::vector<std::byte>> pack(const SampleOptions& options, const LoadedPackage& sampler,
+                                    const Package& body, Avatar avatar) {
+  const Result<Portrait> portrait =
+      draw(avatar, body, options.precision == "f32" ? Precision::kFloat32 : Precision::kFixedPoint);
   if (!portrait.ok()) return portrait.status();
   if (options.precision != "f32") {
     avatar.golden.fixed_point_hash = hash_picture(portrait->frame.u8.pixels);
@@ -140,23 +157,28 @@ Result<std::vector<std::byte>> pack(const SampleOptions& options, const LoadedPa
 Result<SampleRequest> checked_request(const SampleOptions& options) {
   SampleRequest request = options.request;
   if (options.to.has_value() != options.mix.has_value()) {
-    return Status(StatusCode::kInvalidArgument, "sample: --to and --mix go together: the seed to blend with, and how far to go (0 to 1)");
+    return Status(
+        StatusCode::kInvalidArgument,
+        "sample: --to and --mix go together: the seed to blend with, and how far to go (0 to 1)");
   }
   request.to = options.to.value_or(0), request.mix = options.mix.value_or(0);
   if (!options.solver.empty()) {
-    request.method = options.solver == "ddim" ? SolverMethod::kDdim : SolverMethod::kDpmSolverPlusPlus2M;
+    request.method =
+        options.solver == "ddim" ? SolverMethod::kDdim : SolverMethod::kDpmSolverPlusPlus2M;
   }
   return request;
 }
 
 Status run_sample(SampleOptions options) {
-  if (!options.output.ends_with(".fgn")) return Status(StatusCode::kUnsupported, options.output + ": avatars are written as .fgn");
+  if (!options.output.ends_with(".fgn"))
+    return Status(StatusCode::kUnsupported, options.output + ": avatars are written as .fgn");
   const Result<SampleRequest> request = checked_request(options);
   if (!request.ok()) return request.status();
   options.request = *request;
 
   const uint64_t start_ns = now_ns();
-  const Result<std::unique_ptr<LoadedPackage>> loaded = load_package(options.sampler, PackageKind::kSampler);
+  const Result<std::unique_ptr<LoadedPackage>> loaded =
+      load_package(options.sampler, PackageKind::kSampler);
   if (!loaded.ok()) return loaded.status();
   const Sampler& from = (*loaded)->package.sampler();
   const Result<std::unique_ptr<AvatarSampler>> sampler = AvatarSampler::create(from);
@@ -170,16 +192,19 @@ Status run_sample(SampleOptions options) {
 
   Avatar avatar = person.avatar();
   avatar.name = options.name.empty() ? default_name(from, options.request) : options.name;
-  const Result<std::unique_ptr<LoadedPackage>> body = find_body(avatar, avatar.name, options.sampler, options.body);
+  const Result<std::unique_ptr<LoadedPackage>> body =
+      find_body(avatar, avatar.name, options.sampler, options.body);
   if (!body.ok()) return body.status();
   std::unique_ptr<Strip> strip;
   if (!options.trace.empty()) {
     const uint32_t steps = steps_of(options.request, from);
-    Result<std::unique_ptr<Strip>> created = Strip::create(options.trace, from, (*body)->package, steps);
+    Result<std::unique_ptr<Strip>> created =
+        Strip::create(options.trace, from, (*body)->package, steps);
     if (!created.ok()) return created.status();
     strip = std::move(*created);
     SampledAvatar again;  // the same person, watched
-    FIG_RETURN_IF_ERROR((*sampler)->sample(options.request, again, strip.get()).within(options.sampler));
+    FIG_RETURN_IF_ERROR(
+        (*sampler)->sample(options.request, again, strip.get()).within(options.sampler));
   }
   const std::array<uint64_t, 2> hash = hash_weights(avatar.fixed_point, avatar.shape);
   const Result<std::vector<std::byte>> bytes = pack(options, **loaded, (*body)->package, avatar);
@@ -188,27 +213,33 @@ Status run_sample(SampleOptions options) {
   FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.output, *bytes));
   if (strip) FIG_RETURN_IF_ERROR(strip->finish());
 
-  const auto seconds = [](uint64_t from_ns, uint64_t to_ns) { return static_cast<double>(to_ns - from_ns) * 1e-9; };
+  const auto seconds = [](uint64_t from_ns, uint64_t to_ns) {
+    return static_cast<double>(to_ns - from_ns) * 1e-9;
+  };
   const uint32_t evaluations = steps_of(options.request, from);
   if (options.json) {
     nlohmann::ordered_json json = json_header("sample");
     json["sampler"] = options.sampler;
     json["output"] = options.output;
     json["seed"] = options.request.seed;
-    if (options.request.mix != 0) json["to"] = options.request.to, json["mix"] = options.request.mix;
+    if (options.request.mix != 0)
+      json["to"] = options.request.to, json["mix"] = options.request.mix;
     json["solver"] = to_string(method_of(options.request, from));
     json["evaluations"] = evaluations;
     json["weights_hash"] = format_hash(hash);
     json["size_bytes"] = bytes->size();
-    json["seconds"] = {{"open", seconds(start_ns, loaded_ns)}, {"sample", seconds(loaded_ns, sampled_ns)}};
+    json["seconds"] = {{"open", seconds(start_ns, loaded_ns)},
+                       {"sample", seconds(loaded_ns, sampled_ns)}};
     json["macs_per_evaluation"] = (*sampler)->macs_per_evaluation();
     json["sampler_memory_bytes"] = (*sampler)->memory_bytes();
-    json["peak_memory_bytes"] = peak_bytes;  // of the process when the weights were there, the package's mapped pages included
+    json["peak_memory_bytes"] = peak_bytes;  // of the process when the weights were there, the
+                                             // package's mapped pages included
     json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", usable_cpus()}, {"threads", 1}};
     print_json(json);
   } else {
-    std::fprintf(stderr, "%s: %s, %u evaluations in %.2f s, weights %s\n", options.output.c_str(), avatar.name.c_str(), evaluations,
-                 seconds(loaded_ns, sampled_ns), format_hash(hash).c_str());
+    std::fprintf(stderr, "%s: %s, %u evaluations in %.2f s, weights %s\n", options.output.c_str(),
+                 avatar.name.c_str(), evaluations, seconds(loaded_ns, sampled_ns),
+                 format_hash(hash).c_str());
   }
   return {};
 }
@@ -219,19 +250,34 @@ Command add_sample_command(CLI::App& app) {
   auto options = std::make_shared<SampleOptions>();
   CLI::App* command = app.add_subcommand("sample", "Samples the weights of a new avatar");
   command->add_option("sampler", options->sampler, "sampler package (.fgn)")->required();
-  command->add_option("--seed", options->request.seed, "the avatar's number: the same avatar on every device")->required();
+  command
+      ->add_option("--seed", options->request.seed,
+                   "the avatar's number: the same avatar on every device")
+      ->required();
   command->add_option("--to", options->to, "second seed, to blend with");
-  command->add_option("--mix", options->mix, "how far from --seed to --to, 0 to 1")->check(CLI::Range(0.0, 1.0));
-  command->add_option("--steps", options->request.steps, "evaluations of the denoiser; default: the sampler's")
+  command->add_option("--mix", options->mix, "how far from --seed to --to, 0 to 1")
+      ->check(CLI::Range(0.0, 1.0));
+  command
+      ->add_option("--steps", options->request.steps,
+                   "evaluations of the denoiser; default: the sampler's")
       ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
-  command->add_option("--solver", options->solver, "ddim (first order) or dpmpp2m (second order); default: the sampler's")
+  command
+      ->add_option("--solver", options->solver,
+                   "ddim (first order) or dpmpp2m (second order); default: the sampler's")
       ->check(CLI::IsMember({"ddim", "dpmpp2m"}));
-  command->add_option("--precision", options->precision, "what the avatar holds: fixed point, float weights, or both")
+  command
+      ->add_option("--precision", options->precision,
+                   "what the avatar holds: fixed point, float weights, or both")
       ->check(CLI::IsMember({"q8", "f32", "f32,q8"}))
       ->capture_default_str();
-  command->add_option("--body", options->body, "body package; default: found by content hash beside the sampler, then in FIGURINE_PATH");
-  command->add_option("--name", options->name, "of the avatar; default: the sampler's name and the seed");
-  command->add_option("--trace", options->trace, "folder: a picture of the avatar after every step, and strip.png of ten of them");
+  command->add_option(
+      "--body", options->body,
+      "body package; default: found by content hash beside the sampler, then in FIGURINE_PATH");
+  command->add_option("--name", options->name,
+                      "of the avatar; default: the sampler's name and the seed");
+  command->add_option(
+      "--trace", options->trace,
+      "folder: a picture of the avatar after every step, and strip.png of ten of them");
   command->add_option("-o,--output", options->output, "avatar package to write (.fgn)")->required();
   command->add_flag("--json", options->json, "print a summary as JSON");
   return {command, [options] { return run_sample(*options); }};

@@ -34,8 +34,10 @@ struct Solver {
   const char* theory;
 };
 constexpr Solver kSolvers[] = {
-    {SolverMethod::kDpmSolverPlusPlus2M, "steps of DPM-Solver++(2M), each with one evaluation of the denoiser", 2,
-     "Two predictions make a straight line in lambda of what the denoiser believes: the error falls with the square of the step."},
+    {SolverMethod::kDpmSolverPlusPlus2M,
+     "steps of DPM-Solver++(2M), each with one evaluation of the denoiser", 2,
+     "Two predictions make a straight line in lambda of what the denoiser believes: the error "
+     "falls with the square of the step."},
     {SolverMethod::kDdim, "steps of DDIM, each with one evaluation of the denoiser", 1,
      "One prediction is held over the step: the error falls with the step."}};
 
@@ -44,10 +46,12 @@ struct Setting {
   std::vector<double> ms;
 };
 
-// A person in the golden pose, drawn from its float weights: the rounding to int8 would hide how the error falls.
+// A person in the golden pose, drawn from its float weights: the rounding to int8 would hide how
+// the error falls.
 class Portraitist {
  public:
-  static Result<std::unique_ptr<Portraitist>> create(const LoadedPackage& package, const std::string& body_option) {
+  static Result<std::unique_ptr<Portraitist>> create(const LoadedPackage& package,
+                                                     const std::string& body_option) {
     const Sampler& sampler = package.package.sampler();
     auto made = std::make_unique<Portraitist>();
     Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler);
@@ -55,8 +59,10 @@ class Portraitist {
     made->sampler_ = std::move(*device);
     made->golden_ = sampler.golden;
     SampledAvatar person;
-    FIG_RETURN_IF_ERROR(made->sampler_->sample({.seed = 0, .steps = 1}, person).within(package.path));
-    Result<std::unique_ptr<LoadedPackage>> body = find_body(person.avatar(), package.path, package.path, body_option);
+    FIG_RETURN_IF_ERROR(
+        made->sampler_->sample({.seed = 0, .steps = 1}, person).within(package.path));
+    Result<std::unique_ptr<LoadedPackage>> body =
+        find_body(person.avatar(), package.path, package.path, body_option);
     if (!body.ok()) return body.status();
     made->body_ = std::move(*body);
     return made;
@@ -70,11 +76,14 @@ class Portraitist {
     if (ms != nullptr) *ms = static_cast<double>(now_ns() - start_ns) * 1e-6;
     Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1});
     if (!renderer.ok()) return renderer.status();
-    const Result<AvatarId> id = (*renderer)->add_avatar(person.avatar(), body_->package, Precision::kFloat32);
+    const Result<AvatarId> id =
+        (*renderer)->add_avatar(person.avatar(), body_->package, Precision::kFloat32);
     if (!id.ok()) return id.status();
     RenderedFrame frame({golden_.camera.width_px, golden_.camera.height_px}, PixelFormat::kRgbaF32);
-    const FrameAvatar posed[] = {{.avatar = *id, .pose = {golden_.root_translation_m, golden_.rotations}}};
-    FIG_RETURN_IF_ERROR((*renderer)->render({.camera = golden_.camera, .avatars = posed}, frame.target()));
+    const FrameAvatar posed[] = {
+        {.avatar = *id, .pose = {golden_.root_translation_m, golden_.rotations}}};
+    FIG_RETURN_IF_ERROR(
+        (*renderer)->render({.camera = golden_.camera, .avatars = posed}, frame.target()));
     return std::move(frame.f32);
   }
 
@@ -105,11 +114,14 @@ Result<ReportPicture> shown(const std::string& caption, const ports::ImageF32& p
 
 Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
-double order_between(const Setting& coarse, uint32_t coarse_evaluations, const Setting& fine, uint32_t fine_evaluations) {
-  return std::log(coarse.error.rmse() / fine.error.rmse()) / std::log(double(fine_evaluations) / coarse_evaluations);
+double order_between(const Setting& coarse, uint32_t coarse_evaluations, const Setting& fine,
+                     uint32_t fine_evaluations) {
+  return std::log(coarse.error.rmse() / fine.error.rmse()) /
+         std::log(double(fine_evaluations) / coarse_evaluations);
 }
 
-Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs, const std::vector<Setting>& settings) {
+Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs,
+               const std::vector<Setting>& settings) {
   Json json = {{"name", std::string("step of ") + to_string(solver.method)},
                {"meaning", solver.meaning},
                {"theoretical_order", solver.order},
@@ -127,16 +139,19 @@ Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs, cons
                 {"largest", setting.error.largest},
                 {"observed_order", nullptr}};
     if (s > 0 && setting.error.squared > 0 && settings[s - 1].error.squared > 0) {
-      row["observed_order"] = order_between(settings[s - 1], kEvaluations[s - 1], setting, kEvaluations[s]);
+      row["observed_order"] =
+          order_between(settings[s - 1], kEvaluations[s - 1], setting, kEvaluations[s]);
     }
     const Summary cost_ms = summarise(setting.ms);
     row["cost_ms"] = {{"median", cost_ms.median}, {"p90", cost_ms.p90}};
     row["work"] = {{"evaluations", kEvaluations[s]}, {"macs", macs * kEvaluations[s]}};
     json["settings"].push_back(std::move(row));
   }
-  const Setting &coarse = settings[settings.size() - 4], &fine = settings.back();  // 20 to 250: where the steps are small
+  const Setting &coarse = settings[settings.size() - 4],
+                &fine = settings.back();  // 20 to 250: where the steps are small
   if (coarse.error.squared > 0 && fine.error.squared > 0) {
-    json["observed_order"] = order_between(coarse, kEvaluations[settings.size() - 4], fine, kEvaluations[settings.size() - 1]);
+    json["observed_order"] = order_between(coarse, kEvaluations[settings.size() - 4], fine,
+                                           kEvaluations[settings.size() - 1]);
   }
   return json;
 }
@@ -148,24 +163,28 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   Result<std::unique_ptr<Portraitist>> made = Portraitist::create(package, options.body);
   if (!made.ok()) return made.status();
   Portraitist& portraitist = **made;
-  std::vector<std::vector<Setting>> settings(std::size(kSolvers), std::vector<Setting>(std::size(kEvaluations)));
+  std::vector<std::vector<Setting>> settings(std::size(kSolvers),
+                                             std::vector<Setting>(std::size(kEvaluations)));
   std::vector<ReportPicture> pictures;
   Progress progress("report", options.seeds * std::size(kSolvers) * std::size(kEvaluations));
   uint64_t done = 0;
   for (uint64_t seed = 0; seed < options.seeds; ++seed) {
-    const Result<ports::ImageF32> truth = portraitist.draw({.seed = seed, .steps = kReferenceEvaluations}, nullptr);
+    const Result<ports::ImageF32> truth =
+        portraitist.draw({.seed = seed, .steps = kReferenceEvaluations}, nullptr);
     if (!truth.ok()) return truth.status();
     for (size_t s = 0; s < std::size(kEvaluations); ++s) {
       for (size_t m = 0; m < std::size(kSolvers); ++m) {
         FIG_RETURN_IF_ERROR(check_interrupt());
         double ms = 0;
-        const Result<ports::ImageF32> picture =
-            portraitist.draw({.seed = seed, .steps = kEvaluations[s], .method = kSolvers[m].method}, &ms);
+        const Result<ports::ImageF32> picture = portraitist.draw(
+            {.seed = seed, .steps = kEvaluations[s], .method = kSolvers[m].method}, &ms);
         if (!picture.ok()) return picture.status();
         add_foreground_error(*truth, *picture, settings[m][s].error);
         settings[m][s].ms.push_back(ms);
-        if (seed == 0 && m == 0 && std::find(std::begin(kShown), std::end(kShown), kEvaluations[s]) != std::end(kShown)) {
-          Result<ReportPicture> one = shown("seed 0 in " + std::to_string(kEvaluations[s]) + " evaluations", *picture);
+        if (seed == 0 && m == 0 &&
+            std::find(std::begin(kShown), std::end(kShown), kEvaluations[s]) != std::end(kShown)) {
+          Result<ReportPicture> one =
+              shown("seed 0 in " + std::to_string(kEvaluations[s]) + " evaluations", *picture);
           if (!one.ok()) return one.status();
           pictures.push_back(std::move(*one));
         }
@@ -181,20 +200,29 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
 
   Json json = json_header("report");
   json["date"] = date_utc();
-  json["machine"] = {{"cpu", cpu_name()}, {"cpus", usable_cpus()}, {"threads", 1}, {"precision", "q8"}, {"isa", "scalar"}};
+  json["machine"] = {{"cpu", cpu_name()},
+                     {"cpus", usable_cpus()},
+                     {"threads", 1},
+                     {"precision", "q8"},
+                     {"isa", "scalar"}};
   json["sampler"] = package.path;
   json["seeds"] = options.seeds;
   json["size"] = {portraitist.golden().camera.width_px, portraitist.golden().camera.height_px};
-  json["reference"] = {{"evaluations", kReferenceEvaluations},
-                       {"meaning", "the same seeds in 500 evaluations of DPM-Solver++(2M) by the same integers"}};
+  json["reference"] = {
+      {"evaluations", kReferenceEvaluations},
+      {"meaning", "the same seeds in 500 evaluations of DPM-Solver++(2M) by the same integers"}};
   json["metric"] =
-      "PSNR of the sampled people in the golden pose, drawn from float weights, over pixels whose alpha in the reference exceeds 0.5, on "
+      "PSNR of the sampled people in the golden pose, drawn from float weights, over pixels whose "
+      "alpha in the reference exceeds 0.5, on "
       "stored "
-      "sRGB values over mid-grey, squared errors pooled over all seeds; largest is the largest difference of one value there";
-  json["timing"] = "median over the seeds of one sampling, noise to weights in integers; solvers take turns";
+      "sRGB values over mid-grey, squared errors pooled over all seeds; largest is the largest "
+      "difference of one value there";
+  json["timing"] =
+      "median over the seeds of one sampling, noise to weights in integers; solvers take turns";
   json["dials"] = Json::array();
   for (size_t m = 0; m < std::size(kSolvers); ++m) {
-    json["dials"].push_back(dial_json(kSolvers[m], sampler, portraitist.sampler().macs_per_evaluation(), settings[m]));
+    json["dials"].push_back(
+        dial_json(kSolvers[m], sampler, portraitist.sampler().macs_per_evaluation(), settings[m]));
   }
   FIG_RETURN_IF_ERROR(write_report(options.output, json, report_html(json, pictures)));
   if (options.json) print_json(json);

@@ -1,4 +1,5 @@
-// figurine report of a sampler: what the number of evaluations costs, and what it buys in pictures of the sampled people.
+// figurine report of a sampler: what the number of evaluations costs, and what it buys in pictures
+// of the sampled people.
 #pragma once
 
 #include <string>

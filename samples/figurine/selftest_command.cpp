@@ -1,6 +1,6 @@
-// figurine selftest: draws the package's golden frame on this device and compares it: in float with the picture that the trainer's renderer
-// made of it, in fixed point with the hash that it has on every device. Of a sampler: samples its golden seeds and compares the weights'
-// hashes.
+// figurine selftest: draws the package's golden frame on this device and compares it: in float with
+// the picture that the trainer's renderer made of it, in fixed point with the hash that it has on
+// every device. Of a sampler: samples its golden seeds and compares the weights' hashes.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -25,10 +25,12 @@ namespace figurine::samples {
 
 namespace {
 
-// Float pictures of trainer and device agree to 60 dB or better, an rms difference of 0.255 levels of 255. Both pictures are then rounded
-// to whole levels, which adds at most two independent errors of variance 1/12: sqrt(0.255^2 + 2/12) = 0.48 levels, 54.5 dB.
+// Float pictures of trainer and device agree to 60 dB or better, an rms difference of 0.255 levels
+// of 255. Both pictures are then rounded to whole levels, which adds at most two independent errors
+// of variance 1/12: sqrt(0.255^2 + 2/12) = 0.48 levels, 54.5 dB.
 constexpr double kLeastPsnr_db = 54;
-// The golden picture's own foreground, where the device drew nothing: a difference from the background that no rounding makes.
+// The golden picture's own foreground, where the device drew nothing: a difference from the
+// background that no rounding makes.
 constexpr int kForegroundLevels = 25;
 
 struct SelftestOptions {
@@ -42,14 +44,16 @@ struct Comparison {
 };
 
 // alpha is the device's; background is what both pictures were drawn over.
-Comparison compare(const ports::ImageU8& golden, const ports::ImageU8& device, const ports::ImageF32& alpha,
-                   const std::array<float, 3>& background) {
+Comparison compare(const ports::ImageU8& golden, const ports::ImageU8& device,
+                   const ports::ImageF32& alpha, const std::array<float, 3>& background) {
   Comparison result;
   for (size_t pixel = 0; pixel < size_t(golden.width_px) * golden.height_px; ++pixel) {
     const uint8_t* g = &golden.pixels[pixel * golden.channels];
     const uint8_t* d = &device.pixels[4 * pixel];
     bool foreground = alpha.pixels[4 * pixel + 3] > 0.5f;
-    for (int c = 0; c < 3; ++c) foreground = foreground || std::abs(g[c] - std::lround(background[c] * 255)) > kForegroundLevels;
+    for (int c = 0; c < 3; ++c)
+      foreground =
+          foreground || std::abs(g[c] - std::lround(background[c] * 255)) > kForegroundLevels;
     if (!foreground) continue;
     ++result.foreground;
     for (int c = 0; c < 3; ++c) result.error.add((int(d[c]) - int(g[c])) / 255.0);
@@ -63,7 +67,8 @@ struct Golden {
   RenderedFrame transparent;  // for its alpha
 };
 
-Result<Golden> draw_golden(const SelftestOptions& options, const RendererOptions& renderer_options, Precision precision) {
+Result<Golden> draw_golden(const SelftestOptions& options, const RendererOptions& renderer_options,
+                           Precision precision) {
   Result<Cast> cast = Cast::load(options.cast);
   if (!cast.ok()) return cast.status();
   const GoldenFrame& golden = cast->avatar(0).avatar.golden;
@@ -71,11 +76,14 @@ Result<Golden> draw_golden(const SelftestOptions& options, const RendererOptions
   if (!renderer.ok()) return renderer.status();
   FIG_RETURN_IF_ERROR(cast->add_to(**renderer, precision));
   const ImageSize size{golden.camera.width_px, golden.camera.height_px};
-  Golden drawn{RenderedFrame(size, PixelFormat::kRgba8), RenderedFrame(size, PixelFormat::kRgbaF32)};
+  Golden drawn{RenderedFrame(size, PixelFormat::kRgba8),
+               RenderedFrame(size, PixelFormat::kRgbaF32)};
   const std::span<const FrameAvatar> posed = cast->pose(0);
+  FIG_RETURN_IF_ERROR((*renderer)->render(
+      {.camera = golden.camera, .avatars = posed, .background = golden.background},
+      drawn.picture.target()));
   FIG_RETURN_IF_ERROR(
-      (*renderer)->render({.camera = golden.camera, .avatars = posed, .background = golden.background}, drawn.picture.target()));
-  FIG_RETURN_IF_ERROR((*renderer)->render({.camera = golden.camera, .avatars = posed}, drawn.transparent.target()));
+      (*renderer)->render({.camera = golden.camera, .avatars = posed}, drawn.transparent.target()));
   return drawn;
 }
 
@@ -86,30 +94,43 @@ struct Verdict {
   std::string text, reason;
 };
 
-Result<Verdict> compare_floats(const SelftestOptions& options, const RendererOptions& renderer_options, const GoldenFrame& golden) {
+Result<Verdict> compare_floats(const SelftestOptions& options,
+                               const RendererOptions& renderer_options, const GoldenFrame& golden) {
   const std::string& path = options.cast.avatars[0];
-  const Result<ports::ImageU8> expected = ports::decode_png(std::as_bytes(golden.png), path + ": golden frame");
+  const Result<ports::ImageU8> expected =
+      ports::decode_png(std::as_bytes(golden.png), path + ": golden frame");
   if (!expected.ok()) return expected.status();
-  if (expected->width_px != golden.camera.width_px || expected->height_px != golden.camera.height_px || expected->channels < 3) {
-    return Status(StatusCode::kCorrupt, path + ": golden frame: the picture's size or channels are not the camera's");
+  if (expected->width_px != golden.camera.width_px ||
+      expected->height_px != golden.camera.height_px || expected->channels < 3) {
+    return Status(StatusCode::kCorrupt,
+                  path + ": golden frame: the picture's size or channels are not the camera's");
   }
   const Result<Golden> drawn = draw_golden(options, renderer_options, Precision::kFloat32);
   if (!drawn.ok()) return drawn.status();
-  const Comparison result = compare(*expected, drawn->picture.u8, drawn->transparent.f32, golden.background);
+  const Comparison result =
+      compare(*expected, drawn->picture.u8, drawn->transparent.f32, golden.background);
   const double psnr_db = result.error.psnr_db();
   const long largest = std::lround(result.error.largest * 255);
-  Verdict verdict{.passed = result.foreground > 0 && psnr_db >= kLeastPsnr_db, .json = {}, .text = {}, .reason = {}};
-  verdict.json["psnr_db"] = std::isinf(psnr_db) ? nlohmann::ordered_json() : nlohmann::ordered_json(psnr_db);  // null: equal to the bit
+  Verdict verdict{.passed = result.foreground > 0 && psnr_db >= kLeastPsnr_db,
+                  .json = {},
+                  .text = {},
+                  .reason = {}};
+  verdict.json["psnr_db"] = std::isinf(psnr_db)
+                                ? nlohmann::ordered_json()
+                                : nlohmann::ordered_json(psnr_db);  // null: equal to the bit
   verdict.json["least_psnr_db"] = kLeastPsnr_db;
   verdict.json["largest_difference_levels"] = largest;
   verdict.json["foreground_pixels"] = result.foreground;
-  verdict.text = std::format("f32: golden frame {}: {:.2f} dB over {} foreground pixels (at least {:.0f}), largest difference {} of 255",
-                             verdict.passed ? "agrees" : "DIFFERS", psnr_db, result.foreground, kLeastPsnr_db, largest);
+  verdict.text = std::format(
+      "f32: golden frame {}: {:.2f} dB over {} foreground pixels (at least {:.0f}), largest "
+      "difference {} of 255",
+      verdict.passed ? "agrees" : "DIFFERS", psnr_db, result.foreground, kLeastPsnr_db, largest);
   verdict.reason = "this device's picture differs from the trainer's";
   return verdict;
 }
 
-Result<Verdict> compare_hashes(const SelftestOptions& options, const RendererOptions& renderer_options, const GoldenFrame& golden) {
+Result<Verdict> compare_hashes(const SelftestOptions& options,
+                               const RendererOptions& renderer_options, const GoldenFrame& golden) {
   const Result<Golden> drawn = draw_golden(options, renderer_options, Precision::kFixedPoint);
   if (!drawn.ok()) return drawn.status();
   const std::array<uint64_t, 2> hash = hash_picture(drawn->picture.u8.pixels);
@@ -120,22 +141,29 @@ Result<Verdict> compare_hashes(const SelftestOptions& options, const RendererOpt
                                  {"golden_hash", there},
                                  {"library", network_library()},
                                  {"golden_library", golden.fixed_point_library}};
-  verdict.text = verdict.passed ? "q8: golden frame agrees to the bit: " + here : "q8: golden frame DIFFERS: " + here + ", not " + there;
-  verdict.reason = std::format("in fixed point this device's picture is {} by {}, the package's {} by {}", here, network_library(), there,
-                               golden.fixed_point_library.empty() ? "an unknown library" : golden.fixed_point_library);
+  verdict.text = verdict.passed ? "q8: golden frame agrees to the bit: " + here
+                                : "q8: golden frame DIFFERS: " + here + ", not " + there;
+  verdict.reason = std::format(
+      "in fixed point this device's picture is {} by {}, the package's {} by {}", here,
+      network_library(), there,
+      golden.fixed_point_library.empty() ? "an unknown library" : golden.fixed_point_library);
   return verdict;
 }
 
 // In every precision asked for that the package has a golden picture of.
-Result<std::vector<Verdict>> judge(const SelftestOptions& options, const RendererOptions& renderer_options) {
+Result<std::vector<Verdict>> judge(const SelftestOptions& options,
+                                   const RendererOptions& renderer_options) {
   const std::string& path = options.cast.avatars[0];
   const Result<std::unique_ptr<LoadedAvatar>> loaded = load_avatar(path);
   if (!loaded.ok()) return loaded.status();
   const Avatar& avatar = (*loaded)->avatar;
   const std::optional<Precision> asked = options.device.network_precision();
-  const auto wanted = [&](Precision precision) { return asked ? *asked == precision : avatar.holds(precision); };
+  const auto wanted = [&](Precision precision) {
+    return asked ? *asked == precision : avatar.holds(precision);
+  };
   std::vector<Verdict> verdicts;
-  if (wanted(Precision::kFixedPoint) && avatar.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
+  if (wanted(Precision::kFixedPoint) &&
+      avatar.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
     Result<Verdict> verdict = compare_hashes(options, renderer_options, avatar.golden);
     if (!verdict.ok()) return verdict.status();
     verdicts.push_back(std::move(*verdict));
@@ -145,13 +173,17 @@ Result<std::vector<Verdict>> judge(const SelftestOptions& options, const Rendere
     if (!verdict.ok()) return verdict.status();
     verdicts.push_back(std::move(*verdict));
   }
-  if (verdicts.empty()) return Status(StatusCode::kNotFound, path + ": golden frame: the package has nothing to compare with");
+  if (verdicts.empty())
+    return Status(StatusCode::kNotFound,
+                  path + ": golden frame: the package has nothing to compare with");
   return verdicts;
 }
 
 Status run_sampler_selftest(const Package& package, const std::string& path, bool as_json) {
   const Sampler& sampler = package.sampler();
-  if (sampler.golden_seeds.empty()) return Status(StatusCode::kNotFound, path + ": golden seeds: the package has none to compare with");
+  if (sampler.golden_seeds.empty())
+    return Status(StatusCode::kNotFound,
+                  path + ": golden seeds: the package has none to compare with");
   const Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler);
   if (!device.ok()) return device.status().within(path);
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
@@ -160,11 +192,17 @@ Status run_sampler_selftest(const Package& package, const std::string& path, boo
   Progress progress("selftest", sampler.golden_seeds.size());
   for (const GoldenSeed& golden : sampler.golden_seeds) {
     FIG_RETURN_IF_ERROR(check_interrupt());
-    FIG_RETURN_IF_ERROR((*device)->sample({.seed = golden.seed, .steps = golden.steps, .method = golden.method}, person).within(path));
-    const std::string here = format_hash(hash_weights(person.avatar().fixed_point, person.avatar().shape)),
+    FIG_RETURN_IF_ERROR(
+        (*device)
+            ->sample({.seed = golden.seed, .steps = golden.steps, .method = golden.method}, person)
+            .within(path));
+    const std::string here = format_hash(
+                          hash_weights(person.avatar().fixed_point, person.avatar().shape)),
                       there = format_hash(golden.hash);
-    const std::string seed = std::format("seed {} in {} steps of {}", golden.seed, golden.steps, to_string(golden.method));
-    if (here != there && reason.empty()) reason = std::format("{}: this device's weights are {}, the package's {}", seed, here, there);
+    const std::string seed = std::format("seed {} in {} steps of {}", golden.seed, golden.steps,
+                                         to_string(golden.method));
+    if (here != there && reason.empty())
+      reason = std::format("{}: this device's weights are {}, the package's {}", seed, here, there);
     rows.push_back({{"seed", golden.seed},
                     {"steps", golden.steps},
                     {"solver", to_string(golden.method)},
@@ -172,7 +210,8 @@ Status run_sampler_selftest(const Package& package, const std::string& path, boo
                     {"hash", here},
                     {"golden_hash", there}});
     if (!as_json) {
-      std::printf("%s: %s %s: %s\n", path.c_str(), seed.c_str(), here == there ? "agrees to the bit" : "DIFFERS", here.c_str());
+      std::printf("%s: %s %s: %s\n", path.c_str(), seed.c_str(),
+                  here == there ? "agrees to the bit" : "DIFFERS", here.c_str());
     }
     progress.update(rows.size());
   }
@@ -184,12 +223,14 @@ Status run_sampler_selftest(const Package& package, const std::string& path, boo
     json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", usable_cpus()}, {"threads", 1}};
     print_json(json);
   }
-  return reason.empty() ? Status() : Status(StatusCode::kMismatch, path + ": golden seeds: " + reason);
+  return reason.empty() ? Status()
+                        : Status(StatusCode::kMismatch, path + ": golden seeds: " + reason);
 }
 
 Status run_selftest(const SelftestOptions& options) {
   // Whatever else it is, or is not, is said by what loads an avatar.
-  if (const auto loaded = load_package(options.cast.avatars[0]); loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
+  if (const auto loaded = load_package(options.cast.avatars[0]);
+      loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
     return run_sampler_selftest((*loaded)->package, options.cast.avatars[0], options.device.json);
   }
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
@@ -197,35 +238,43 @@ Status run_selftest(const SelftestOptions& options) {
   const std::string& path = options.cast.avatars[0];
   const Result<std::vector<Verdict>> verdicts = judge(options, *renderer_options);
   if (!verdicts.ok()) return verdicts.status();
-  const auto failed = std::find_if(verdicts->begin(), verdicts->end(), [](const Verdict& verdict) { return !verdict.passed; });
+  const auto failed = std::find_if(verdicts->begin(), verdicts->end(),
+                                   [](const Verdict& verdict) { return !verdict.passed; });
   const bool passed = failed == verdicts->end();
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("selftest");
     json["avatar"] = path;
     json["passed"] = passed;
     for (const Verdict& verdict : *verdicts) json.update(verdict.json);
-    const std::string precision = verdicts->size() > 1 ? "mixed" : verdicts->front().json.contains("fixed_point") ? "q8" : "f32";
+    const std::string precision = verdicts->size() > 1                             ? "mixed"
+                                  : verdicts->front().json.contains("fixed_point") ? "q8"
+                                                                                   : "f32";
     json["machine"] = json_machine(options.device, renderer_options->threads, precision);
     print_json(json);
   } else {
-    for (const Verdict& verdict : *verdicts) std::printf("%s: %s\n", path.c_str(), verdict.text.c_str());
+    for (const Verdict& verdict : *verdicts)
+      std::printf("%s: %s\n", path.c_str(), verdict.text.c_str());
   }
-  return passed ? Status() : Status(StatusCode::kMismatch, path + ": golden frame: " + failed->reason);
+  return passed ? Status()
+                : Status(StatusCode::kMismatch, path + ": golden frame: " + failed->reason);
 }
 
 }  // namespace
 
 Command add_selftest_command(CLI::App& app) {
   auto options = std::make_shared<SelftestOptions>();
-  CLI::App* command = app.add_subcommand(
-      "selftest", "Compares what this device makes of the golden frame, or of a sampler's golden seeds, with the package's");
+  CLI::App* command = app.add_subcommand("selftest",
+                                         "Compares what this device makes of the golden frame, or "
+                                         "of a sampler's golden seeds, with the package's");
   options->cast.avatars.resize(1);
   command
       ->add_option("avatar", options->cast.avatars[0],
-                   "avatar or sampler package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
+                   "avatar or sampler package (.fgn), or a member of a population "
+                   "(people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option("--body", options->cast.body,
-                      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option(
+      "--body", options->cast.body,
+      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
   options->device.add_to(*command);
   return {command, [options] { return run_selftest(*options); }};
 }

@@ -26,7 +26,8 @@ struct SplatCommandOptions {
 };
 
 constexpr ImageSize kDefaultSize{1024, 768};
-// Captured scenes have a subject in the middle and stray Gaussians far out: the picture holds the inner nine tenths.
+// Captured scenes have a subject in the middle and stray Gaussians far out: the picture holds the
+// inner nine tenths.
 constexpr FramingOptions kSceneFraming{.share = 0.9, .margin = 0.05};
 constexpr float kOpacitySeen = 0.1f;
 
@@ -39,25 +40,30 @@ std::array<float, 9> upright(const std::string& up) {
 }
 
 // An orbit around the scene's robust centre, in its own axes.
-Result<Camera> orbit_scene(const GaussianCloud& cloud, std::optional<OrbitCamera> wanted, const std::string& up, ImageSize size) {
+Result<Camera> orbit_scene(const GaussianCloud& cloud, std::optional<OrbitCamera> wanted,
+                           const std::string& up, ImageSize size) {
   const std::array<float, 9> turn = upright(up);
   std::vector<Point> points;
   for (uint32_t i = 0; i < cloud.count(); ++i) {
     if (!(cloud.opacity[i] >= kOpacitySeen)) continue;
     const float* p = &cloud.position_m[3 * size_t(i)];
     Point point;
-    for (int r = 0; r < 3; ++r) point[r] = turn[3 * r] * p[0] + turn[3 * r + 1] * p[1] + turn[3 * r + 2] * p[2];
+    for (int r = 0; r < 3; ++r)
+      point[r] = turn[3 * r] * p[0] + turn[3 * r + 1] * p[1] + turn[3 * r + 2] * p[2];
     points.push_back(point);
   }
   OrbitCamera orbit = wanted.value_or(OrbitCamera{.azimuth_deg = 25, .elevation_deg = 12});
   orbit.target_m = robust_centre(points, kSceneFraming.share);
-  if (!wanted) orbit.distance_m = fit_distance_m(points, orbit, static_cast<double>(size.width_px) / size.height_px, kSceneFraming);
+  if (!wanted)
+    orbit.distance_m = fit_distance_m(
+        points, orbit, static_cast<double>(size.width_px) / size.height_px, kSceneFraming);
   Result<Camera> camera = make_orbit_camera(orbit, size.width_px, size.height_px);
   if (!camera.ok()) return camera;
   const std::array<float, 12> view = camera->view_from_world;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) {
-      camera->view_from_world[4 * r + c] = view[4 * r] * turn[c] + view[4 * r + 1] * turn[3 + c] + view[4 * r + 2] * turn[6 + c];
+      camera->view_from_world[4 * r + c] =
+          view[4 * r] * turn[c] + view[4 * r + 1] * turn[3 + c] + view[4 * r + 2] * turn[6 + c];
     }
   }
   return camera;
@@ -79,7 +85,9 @@ Result<Camera> choose_camera(const SplatCommandOptions& options, const GaussianC
   Result<Camera> camera = Status(StatusCode::kInvalidArgument, "camera");
   if (spec.fixed) {
     const bool has_size = spec.fixed->width_px != 0;
-    camera = resize_camera(*spec.fixed, size.value_or(has_size ? ImageSize{spec.fixed->width_px, spec.fixed->height_px} : kDefaultSize));
+    camera = resize_camera(
+        *spec.fixed, size.value_or(has_size ? ImageSize{spec.fixed->width_px, spec.fixed->height_px}
+                                            : kDefaultSize));
   } else {
     camera = orbit_scene(cloud, spec.orbit, options.up, size.value_or(kDefaultSize));
   }
@@ -92,22 +100,26 @@ Result<Camera> choose_camera(const SplatCommandOptions& options, const GaussianC
 Status run_splat(const SplatCommandOptions& options) {
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
-  Result<Background> background = parse_background(options.background.empty() ? "alpha" : options.background);
+  Result<Background> background =
+      parse_background(options.background.empty() ? "alpha" : options.background);
   if (!background.ok()) return background.status();
   if (!options.output.starts_with("/dev/video") && is_video_name(options.output)) {
-    return Status(StatusCode::kUnsupported, options.output + ": a scene does not move; write .png or .pfm");
+    return Status(StatusCode::kUnsupported,
+                  options.output + ": a scene does not move; write .png or .pfm");
   }
 
   Result<ports::MappedFile> file = ports::MappedFile::open(options.scene);
   if (!file.ok()) return file.status();
   const Result<GaussianCloud> cloud = read_gaussian_ply(file->bytes(), options.scene);
   if (!cloud.ok()) return cloud.status();
-  if (cloud->count() == 0) return Status(StatusCode::kInvalidArgument, options.scene + ": ply: holds no Gaussian that can be drawn");
+  if (cloud->count() == 0)
+    return Status(StatusCode::kInvalidArgument,
+                  options.scene + ": ply: holds no Gaussian that can be drawn");
   const Result<Camera> camera = choose_camera(options, *cloud);
   if (!camera.ok()) return camera.status();
   const ImageSize size{camera->width_px, camera->height_px};
-  Result<std::unique_ptr<FrameSink>> sink =
-      FrameSink::create(options.output, {.size = size, .frame_count = 1, .opaque = background->colour.has_value()});
+  Result<std::unique_ptr<FrameSink>> sink = FrameSink::create(
+      options.output, {.size = size, .frame_count = 1, .opaque = background->colour.has_value()});
   if (!sink.ok()) return sink.status();
 
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
@@ -116,16 +128,19 @@ Status run_splat(const SplatCommandOptions& options) {
   const GaussianView gaussians[] = {cloud->view()};
   FrameLog log;
   const uint64_t start_ns = now_ns();
-  FIG_RETURN_IF_ERROR((*renderer)->render(
-      {.camera = *camera, .gaussians = gaussians, .background = background->colour, .splat = {.alpha_cut = options.alpha_cut}},
-      frame.target()));
+  FIG_RETURN_IF_ERROR((*renderer)->render({.camera = *camera,
+                                           .gaussians = gaussians,
+                                           .background = background->colour,
+                                           .splat = {.alpha_cut = options.alpha_cut}},
+                                          frame.target()));
   log.add((*renderer)->statistics(), now_ns() - start_ns);
   FIG_RETURN_IF_ERROR((*sink)->add(frame));
   FIG_RETURN_IF_ERROR((*sink)->finish());
 
   if (cloud->left_out > 0) {
-    std::fprintf(stderr, "figurine: %s: left out %llu Gaussians that are not finite or have no rotation\n", options.scene.c_str(),
-                 static_cast<unsigned long long>(cloud->left_out));
+    std::fprintf(stderr,
+                 "figurine: %s: left out %llu Gaussians that are not finite or have no rotation\n",
+                 options.scene.c_str(), static_cast<unsigned long long>(cloud->left_out));
   }
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("splat");
@@ -139,7 +154,8 @@ Status run_splat(const SplatCommandOptions& options) {
     json["stages_ms"] = log.stages_json();
     json["work"] = log.work_json();
     json["peak_memory_bytes"] = peak_memory_bytes();
-    json["machine"] = json_machine(options.device, renderer_options->threads, to_string(Precision::kFloat32));
+    json["machine"] =
+        json_machine(options.device, renderer_options->threads, to_string(Precision::kFloat32));
     print_json(json);
   }
   return {};
@@ -150,16 +166,27 @@ Status run_splat(const SplatCommandOptions& options) {
 Command add_splat_command(CLI::App& app) {
   auto options = std::make_shared<SplatCommandOptions>();
   CLI::App* command = app.add_subcommand("splat", "Renders a .ply file of 3D Gaussians");
-  command->add_option("scene", options->scene, "Gaussians in the layout of the original 3DGS (.ply)")->required();
-  command->add_option("--camera", options->camera, "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the scene");
-  command->add_option("--up", options->up, "which axis of the file points up, for orbits: +y, -y, +z or -z")
+  command
+      ->add_option("scene", options->scene, "Gaussians in the layout of the original 3DGS (.ply)")
+      ->required();
+  command->add_option("--camera", options->camera,
+                      "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the scene");
+  command
+      ->add_option("--up", options->up,
+                   "which axis of the file points up, for orbits: +y, -y, +z or -z")
       ->check(CLI::IsMember({"+y", "-y", "+z", "-z"}))
       ->capture_default_str();
-  command->add_option("--near", options->near_m, "metres; Gaussians nearer than this are culled; default 0.2")->check(CLI::PositiveNumber);
-  command->add_option("--alpha-cut", options->alpha_cut, "contributions below it are skipped; default 1/255")
+  command
+      ->add_option("--near", options->near_m,
+                   "metres; Gaussians nearer than this are culled; default 0.2")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--alpha-cut", options->alpha_cut,
+                   "contributions below it are skipped; default 1/255")
       ->check(CLI::Range(1e-9f, 0.5f));
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the camera's, or 1024x768");
-  command->add_option("--background", options->background, "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha");
+  command->add_option("--background", options->background,
+                      "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha");
   command->add_option("-o,--output", options->output, "x.png or x.pfm")->required();
   options->device.add_to(*command);
   return {command, [options] { return run_splat(*options); }};

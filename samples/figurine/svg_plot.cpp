@@ -14,16 +14,21 @@ constexpr double kWidth = 560, kHeight = 380, kLeft = 66, kRight = 22, kTop = 18
 // One axis: data to picture, and its ticks.
 class Scale {
  public:
-  Scale(const PlotAxis& axis, std::vector<double> values, double from, double to) : logarithmic_(axis.logarithmic), from_(from), to_(to) {
+  Scale(const PlotAxis& axis, std::vector<double> values, double from, double to)
+      : logarithmic_(axis.logarithmic), from_(from), to_(to) {
     for (double& value : values) value = logarithmic_ ? std::log10(value) : value;
     low_ = values.empty() ? 0 : *std::min_element(values.begin(), values.end());
     high_ = values.empty() ? 1 : *std::max_element(values.begin(), values.end());
-    const double room = std::max(0.08 * (high_ - low_), logarithmic_ ? 0.1 : 1e-3 * std::max(1.0, std::abs(high_)));
+    const double room =
+        std::max(0.08 * (high_ - low_), logarithmic_ ? 0.1 : 1e-3 * std::max(1.0, std::abs(high_)));
     low_ -= room;
     high_ += room;
   }
 
-  double at(double value) const { return from_ + ((logarithmic_ ? std::log10(value) : value) - low_) / (high_ - low_) * (to_ - from_); }
+  double at(double value) const {
+    return from_ +
+           ((logarithmic_ ? std::log10(value) : value) - low_) / (high_ - low_) * (to_ - from_);
+  }
 
   // About five round values.
   std::vector<double> ticks() const {
@@ -43,7 +48,10 @@ class Scale {
       return result;
     }
     const double rough = (high_ - low_) / 5, power = std::pow(10, std::floor(std::log10(rough)));
-    const double lead = rough / power, step = power * (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10);
+    const double lead = rough / power, step = power * (lead < 1.5   ? 1
+                                                       : lead < 3.5 ? 2
+                                                       : lead < 7.5 ? 5
+                                                                    : 10);
     for (double value = std::ceil(low_ / step) * step; value <= high_; value += step)
       result.push_back(std::abs(value) < 1e-9 * step ? 0 : value);
     return result;
@@ -105,7 +113,9 @@ std::string escape_html(const std::string& text) {
 }
 
 std::string svg_plot(const Plot& plot) {
-  const auto drawable = [](const PlotAxis& axis, double value) { return std::isfinite(value) && (!axis.logarithmic || value > 0); };
+  const auto drawable = [](const PlotAxis& axis, double value) {
+    return std::isfinite(value) && (!axis.logarithmic || value > 0);
+  };
   std::vector<PlotPoint> points;
   std::vector<double> xs, ys;
   for (const PlotPoint& point : plot.points) {
@@ -116,43 +126,52 @@ std::string svg_plot(const Plot& plot) {
   }
   const Scale x(plot.x, xs, kLeft, kWidth - kRight), y(plot.y, ys, kHeight - kBottom, kTop);
 
-  std::string svg = format("<svg viewBox=\"0 0 %.0f %.0f\" role=\"img\" aria-label=\"", kWidth, kHeight) + escape_html(plot.y.title) +
-                    " over " + escape_html(plot.x.title) + "\">\n";
+  std::string svg =
+      format("<svg viewBox=\"0 0 %.0f %.0f\" role=\"img\" aria-label=\"", kWidth, kHeight) +
+      escape_html(plot.y.title) + " over " + escape_html(plot.x.title) + "\">\n";
   for (const double tick : x.ticks()) {
-    svg +=
-        format("<line class=\"grid\" x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>", x.at(tick), kTop, x.at(tick), kHeight - kBottom);
-    svg += format("<text class=\"tick\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">%s</text>\n", x.at(tick), kHeight - kBottom + 17,
-                  number(tick).c_str());
+    svg += format("<line class=\"grid\" x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>",
+                  x.at(tick), kTop, x.at(tick), kHeight - kBottom);
+    svg += format("<text class=\"tick\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">%s</text>\n",
+                  x.at(tick), kHeight - kBottom + 17, number(tick).c_str());
   }
   for (const double tick : y.ticks()) {
-    svg += format("<line class=\"grid\" x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>", kLeft, y.at(tick), kWidth - kRight, y.at(tick));
-    svg += format("<text class=\"tick\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%s</text>\n", kLeft - 8, y.at(tick) + 4,
-                  number(tick).c_str());
+    svg += format("<line class=\"grid\" x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>", kLeft,
+                  y.at(tick), kWidth - kRight, y.at(tick));
+    svg += format("<text class=\"tick\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%s</text>\n",
+                  kLeft - 8, y.at(tick) + 4, number(tick).c_str());
   }
-  svg += format("<text class=\"axis\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">", 0.5 * (kLeft + kWidth - kRight), kHeight - 10) +
+  svg += format("<text class=\"axis\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">",
+                0.5 * (kLeft + kWidth - kRight), kHeight - 10) +
          escape_html(plot.x.title) + "</text>\n";
-  svg += format("<text class=\"axis\" transform=\"translate(16 %.1f) rotate(-90)\" text-anchor=\"middle\">",
-                0.5 * (kTop + kHeight - kBottom)) +
+  svg += format(
+             "<text class=\"axis\" transform=\"translate(16 %.1f) rotate(-90)\" "
+             "text-anchor=\"middle\">",
+             0.5 * (kTop + kHeight - kBottom)) +
          escape_html(plot.y.title) + "</text>\n";
 
   for (const PlotLine& line : plot.lines) {
-    if (!drawable(plot.x, line.from.x) || !drawable(plot.x, line.to.x) || !drawable(plot.y, line.from.y) || !drawable(plot.y, line.to.y))
+    if (!drawable(plot.x, line.from.x) || !drawable(plot.x, line.to.x) ||
+        !drawable(plot.y, line.from.y) || !drawable(plot.y, line.to.y))
       continue;
-    svg += format("<line class=\"theory\" x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>", x.at(line.from.x), y.at(line.from.y),
-                  x.at(line.to.x), y.at(line.to.y));
-    svg += format("<text class=\"note\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">", x.at(line.to.x) - 6, y.at(line.to.y) - 8) +
+    svg += format("<line class=\"theory\" x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\"/>",
+                  x.at(line.from.x), y.at(line.from.y), x.at(line.to.x), y.at(line.to.y));
+    svg += format("<text class=\"note\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">",
+                  x.at(line.to.x) - 6, y.at(line.to.y) - 8) +
            escape_html(line.label) + "</text>\n";
   }
   std::string path;
-  for (const PlotPoint& point : points) path += format("%s%.1f %.1f", path.empty() ? "M" : "L", x.at(point.x), y.at(point.y));
+  for (const PlotPoint& point : points)
+    path += format("%s%.1f %.1f", path.empty() ? "M" : "L", x.at(point.x), y.at(point.y));
   if (points.size() > 1) svg += "<path class=\"curve\" d=\"" + path + "\"/>\n";
   for (const PlotPoint& point : points) {
     const double px = x.at(point.x), py = y.at(point.y);
     const bool left = px > kWidth - kRight - 70;  // labels stay inside
-    svg += format("<circle class=\"%s\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/>", point.emphasised ? "default" : "point", px, py,
-                  point.emphasised ? 6.5 : 4.5);
-    svg += format("<text class=\"%s\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">", point.emphasised ? "label strong" : "label",
-                  px + (left ? -9 : 9), py + (left ? -8 : 14), left ? "end" : "start") +
+    svg += format("<circle class=\"%s\" cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"/>",
+                  point.emphasised ? "default" : "point", px, py, point.emphasised ? 6.5 : 4.5);
+    svg += format("<text class=\"%s\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">",
+                  point.emphasised ? "label strong" : "label", px + (left ? -9 : 9),
+                  py + (left ? -8 : 14), left ? "end" : "start") +
            escape_html(point.label) + "</text>\n";
   }
   return svg + "</svg>\n";

@@ -24,8 +24,8 @@ struct PlotLine {  // straight in the plot's own coordinates (a power law on two
 
 struct Plot {
   PlotAxis x, y;
-  std::vector<PlotPoint>
-      points;  // connected in this order; points that are not finite, or not positive on a logarithmic axis, are left out
+  std::vector<PlotPoint> points;  // connected in this order; points that are not finite, or not
+                                  // positive on a logarithmic axis, are left out
   std::vector<PlotLine> lines;
 };
 

@@ -1,9 +1,11 @@
-// One-sided Jacobi: plane rotations from the right make the columns of F orthogonal; then F V = U S, the columns' lengths are the singular
-// values and their directions the axes. Squaring the matrix first (eigenvectors of F F^T) would lose half of the digits: a needle of 1:1000
-// would come out with a wrong or negative small axis in float.
+// One-sided Jacobi: plane rotations from the right make the columns of F orthogonal; then F V = U
+// S, the columns' lengths are the singular values and their directions the axes. Squaring the
+// matrix first (eigenvectors of F F^T) would lose half of the digits: a needle of 1:1000 would come
+// out with a wrong or negative small axis in float.
 //
-// Based on: Hestenes, Inversion of Matrices by Biorthogonalization and Related Results, 1958; Demmel and Veselic, Jacobi's Method is More
-// Accurate than QR, 1992. Quaternion from a rotation matrix: Shepperd, Quaternion from Rotation Matrix, 1978.
+// Based on: Hestenes, Inversion of Matrices by Biorthogonalization and Related Results, 1958;
+// Demmel and Veselic, Jacobi's Method is More Accurate than QR, 1992. Quaternion from a rotation
+// matrix: Shepperd, Quaternion from Rotation Matrix, 1978.
 #include "samples/gaussians/decompose.h"
 
 #include <cmath>
@@ -16,8 +18,12 @@ namespace {
 using Vector = std::array<double, 3>;
 
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vector cross(const Vector& a, const Vector& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-Vector scaled(const Vector& a, double factor) { return {a[0] * factor, a[1] * factor, a[2] * factor}; }
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vector scaled(const Vector& a, double factor) {
+  return {a[0] * factor, a[1] * factor, a[2] * factor};
+}
 
 // Makes two columns orthogonal; false if they already are, to rounding.
 bool rotate(Vector& p, Vector& q) {
@@ -69,7 +75,8 @@ ScaleRotation decompose(const float* factor) {
   for (int i = 0; i < 9; ++i) largest = std::fmax(largest, std::abs(double(factor[i])));
   if (largest == 0) return {{0, 0, 0}, {1, 0, 0, 0}};
   std::array<Vector, 3> column;
-  for (int c = 0; c < 3; ++c) column[c] = {factor[c] / largest, factor[3 + c] / largest, factor[6 + c] / largest};
+  for (int c = 0; c < 3; ++c)
+    column[c] = {factor[c] / largest, factor[3 + c] / largest, factor[6 + c] / largest};
   constexpr int kMaxSweeps = 30;  // converges quadratically; 4 to 6 sweeps in practice
   for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     bool moved = rotate(column[0], column[1]);
@@ -88,7 +95,8 @@ ScaleRotation decompose(const float* factor) {
   order(0, 1);
   order(1, 2);
   order(0, 1);
-  // Axes of vanished lengths are free; the third always follows from the first two, which also makes the rotation proper.
+  // Axes of vanished lengths are free; the third always follows from the first two, which also
+  // makes the rotation proper.
   const Vector x = scaled(column[0], 1 / length[0]);
   Vector y = any_orthogonal(x);
   if (length[1] > 1e-12 * length[0]) {
@@ -97,7 +105,8 @@ ScaleRotation decompose(const float* factor) {
     for (int k = 0; k < 3; ++k) y[k] -= slip * x[k];
     y = scaled(y, 1 / std::sqrt(dot(y, y)));
   }
-  return {{length[0] * largest, length[1] * largest, length[2] * largest}, quaternion_of(x, y, cross(x, y))};
+  return {{length[0] * largest, length[1] * largest, length[2] * largest},
+          quaternion_of(x, y, cross(x, y))};
 }
 
 }  // namespace figurine::samples

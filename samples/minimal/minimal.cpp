@@ -1,8 +1,11 @@
-// The smallest program on the runtime: an avatar and its body from memory, one frame into memory, raw RGBA out.
+// The smallest program on the runtime: an avatar and its body from memory, one frame into memory,
+// raw RGBA out.
 //
-//   minimal AVATAR.fgn BODY.fgn WIDTH HEIGHT > frame.rgba        (ffmpeg -f rawvideo -pix_fmt rgba -s 512x512 -i frame.rgba frame.png)
+//   minimal AVATAR.fgn BODY.fgn WIDTH HEIGHT > frame.rgba        (ffmpeg -f rawvideo -pix_fmt rgba
+//   -s 512x512 -i frame.rgba frame.png)
 //
-// It needs the runtime library and nothing else of the project. In C++ for now: the C interface comes with a later version.
+// It needs the runtime library and nothing else of the project. In C++ for now: the C interface
+// comes with a later version.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -13,7 +16,8 @@
 
 namespace {
 
-// Package bytes must start at a multiple of 64. On a device they may as well lie in flash or in a memory map.
+// Package bytes must start at a multiple of 64. On a device they may as well lie in flash or in a
+// memory map.
 struct Free {
   void operator()(std::byte* memory) const { std::free(memory); }
 };
@@ -30,9 +34,11 @@ Bytes read_file(const char* path) {
   const long size = std::ftell(file);
   std::rewind(file);
   if (size > 0) {
-    const size_t room = (static_cast<size_t>(size) + figurine::kBlobAlignment - 1) / figurine::kBlobAlignment * figurine::kBlobAlignment;
+    const size_t room = (static_cast<size_t>(size) + figurine::kBlobAlignment - 1) /
+                        figurine::kBlobAlignment * figurine::kBlobAlignment;
     bytes.memory.reset(static_cast<std::byte*>(std::aligned_alloc(figurine::kBlobAlignment, room)));
-    if (bytes.memory) bytes.size = std::fread(bytes.memory.get(), 1, static_cast<size_t>(size), file);
+    if (bytes.memory)
+      bytes.size = std::fread(bytes.memory.get(), 1, static_cast<size_t>(size), file);
   }
   std::fclose(file);
   return bytes;
@@ -56,16 +62,18 @@ int main(int argc, char** argv) {
   if (!avatar.ok()) return fail(avatar.status());
   Result<Package> body = Package::open({body_bytes.memory.get(), body_bytes.size}, argv[2]);
   if (!body.ok()) return fail(body.status());
-  if (avatar->kind() != PackageKind::kAvatar) return fail({StatusCode::kInvalidArgument, std::string(argv[1]) + ": is no avatar"});
-  if (body->kind() != PackageKind::kBody) return fail({StatusCode::kInvalidArgument, std::string(argv[2]) + ": is no body"});
+  if (avatar->kind() != PackageKind::kAvatar)
+    return fail({StatusCode::kInvalidArgument, std::string(argv[1]) + ": is no avatar"});
+  if (body->kind() != PackageKind::kBody)
+    return fail({StatusCode::kInvalidArgument, std::string(argv[2]) + ": is no body"});
 
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1});
   if (!renderer.ok()) return fail(renderer.status());
   const Result<AvatarId> person = (*renderer)->add_avatar(*avatar, *body);
   if (!person.ok()) return fail(person.status());
 
-  // Every avatar carries a pose and a camera that show it. Your own pose: joint_count() quaternions (w, x, y, z) and a translation of the
-  // root.
+  // Every avatar carries a pose and a camera that show it. Your own pose: joint_count() quaternions
+  // (w, x, y, z) and a translation of the root.
   const GoldenFrame& golden = avatar->avatar().golden;
   const FrameAvatar posed{.avatar = *person, .pose = {golden.root_translation_m, golden.rotations}};
   const auto width = static_cast<uint32_t>(std::strtoul(argv[3], nullptr, 10)),
@@ -80,7 +88,10 @@ int main(int argc, char** argv) {
 
   std::vector<uint8_t> rgba(size_t(width) * height * 4);
   const Status drawn =
-      (*renderer)->render({.camera = camera, .avatars = {&posed, 1}}, {.pixels = rgba.data(), .stride_bytes = size_t(width) * 4});
+      (*renderer)->render({.camera = camera, .avatars = {&posed, 1}},
+                          {.pixels = rgba.data(), .stride_bytes = size_t(width) * 4});
   if (!drawn.ok()) return fail(drawn);
-  return std::fwrite(rgba.data(), 1, rgba.size(), stdout) == rgba.size() && std::fflush(stdout) == 0 ? 0 : 1;
+  return std::fwrite(rgba.data(), 1, rgba.size(), stdout) == rgba.size() && std::fflush(stdout) == 0
+             ? 0
+             : 1;
 }

@@ -18,7 +18,10 @@ void check(xnn_status status) { FIG_CHECK(status == xnn_status_success, "XNNPACK
 class Builder {
  public:
   Builder(const Network& network, const FixedPointNetwork& fixed)
-      : network_(network), fixed_(fixed), shapes_(*infer_shapes(network, false)), ids_(shapes_.size()) {
+      : network_(network),
+        fixed_(fixed),
+        shapes_(*infer_shapes(network, false)),
+        ids_(shapes_.size()) {
     check(xnn_initialize(nullptr));
     check(xnn_create_subgraph(2, 0, &subgraph_));
     for (size_t value = 0; value < shapes_.size(); ++value) define_value(value);
@@ -47,22 +50,29 @@ class Builder {
     const Layer& layer = network_.layers[i];
     const ValueShape& in = shapes_[layer.inputs[0]];
     const size_t dims[4] = {1, in.size, in.size, in.channels};
-    const size_t weight_dims[4] = {layer.out_channels, layer.kernel, layer.kernel, in.channels}, bias_dims[1] = {layer.out_channels};
+    const size_t weight_dims[4] = {layer.out_channels, layer.kernel, layer.kernel, in.channels},
+                 bias_dims[1] = {layer.out_channels};
     const FixedPointConvolution& convolution = fixed_.convolutions[i];
     uint32_t quantised = 0, weights = 0, bias = 0;
-    check(xnn_define_dynamically_quantized_tensor_value(subgraph_, xnn_datatype_qdint8, 4, 3, dims, XNN_INVALID_VALUE_ID, 0, &quantised));
-    check(xnn_define_unary(subgraph_, xnn_unary_convert, nullptr, ids_[layer.inputs[0]], quantised, 0));
-    std::vector<int8_t>& copy = weights_.emplace_back(convolution.weights.begin(), convolution.weights.end());
+    check(xnn_define_dynamically_quantized_tensor_value(subgraph_, xnn_datatype_qdint8, 4, 3, dims,
+                                                        XNN_INVALID_VALUE_ID, 0, &quantised));
+    check(xnn_define_unary(subgraph_, xnn_unary_convert, nullptr, ids_[layer.inputs[0]], quantised,
+                           0));
+    std::vector<int8_t>& copy =
+        weights_.emplace_back(convolution.weights.begin(), convolution.weights.end());
     copy.resize(copy.size() + XNN_EXTRA_BYTES);
-    check(xnn_define_channelwise_quantized_tensor_value(subgraph_, xnn_datatype_qcint8, convolution.weight_scale.data(), 4, 0, weight_dims,
-                                                        copy.data(), XNN_INVALID_VALUE_ID, 0, &weights));
-    check(xnn_define_tensor_value(subgraph_, xnn_datatype_fp32, 1, bias_dims,
-                                  biases_.emplace_back(layer.out_channels + XNN_EXTRA_BYTES / sizeof(float)).data(), XNN_INVALID_VALUE_ID,
-                                  0, &bias));
+    check(xnn_define_channelwise_quantized_tensor_value(
+        subgraph_, xnn_datatype_qcint8, convolution.weight_scale.data(), 4, 0, weight_dims,
+        copy.data(), XNN_INVALID_VALUE_ID, 0, &weights));
+    check(xnn_define_tensor_value(
+        subgraph_, xnn_datatype_fp32, 1, bias_dims,
+        biases_.emplace_back(layer.out_channels + XNN_EXTRA_BYTES / sizeof(float)).data(),
+        XNN_INVALID_VALUE_ID, 0, &bias));
     const uint32_t padding = layer.kernel / 2;
-    check(xnn_define_convolution_2d(subgraph_, padding, padding, padding, padding, layer.kernel, layer.kernel, 1, 1, 1, 1, 1, in.channels,
-                                    layer.out_channels, layer.relu ? 0.0f : -kInfinity, kInfinity, quantised, weights, bias, ids_[i + 1],
-                                    0));
+    check(xnn_define_convolution_2d(subgraph_, padding, padding, padding, padding, layer.kernel,
+                                    layer.kernel, 1, 1, 1, 1, 1, in.channels, layer.out_channels,
+                                    layer.relu ? 0.0f : -kInfinity, kInfinity, quantised, weights,
+                                    bias, ids_[i + 1], 0));
   }
 
   void define_layer(size_t i) {
@@ -72,11 +82,14 @@ class Builder {
       case LayerOp::kConv2d:
         return define_convolution(i);
       case LayerOp::kMaxPool2:
-        return check(xnn_define_max_pooling_2d(subgraph_, 0, 0, 0, 0, 2, 2, 2, 2, 1, 1, -kInfinity, kInfinity, input, output, 0));
+        return check(xnn_define_max_pooling_2d(subgraph_, 0, 0, 0, 0, 2, 2, 2, 2, 1, 1, -kInfinity,
+                                               kInfinity, input, output, 0));
       case LayerOp::kUpsample2:
-        return check(xnn_define_static_resize_bilinear_2d(subgraph_, shapes_[i + 1].size, shapes_[i + 1].size, input, output, 0));
+        return check(xnn_define_static_resize_bilinear_2d(subgraph_, shapes_[i + 1].size,
+                                                          shapes_[i + 1].size, input, output, 0));
       case LayerOp::kConcat:
-        return check(xnn_define_concatenate2(subgraph_, 3, input, ids_[layer.inputs[1]], output, 0));
+        return check(
+            xnn_define_concatenate2(subgraph_, 3, input, ids_[layer.inputs[1]], output, 0));
     }
   }
 
@@ -91,11 +104,14 @@ class Builder {
 
 }  // namespace
 
-DynamicNetwork::DynamicNetwork(const Network& network, const FixedPointNetwork& fixed, ThreadPool& pool) {
+DynamicNetwork::DynamicNetwork(const Network& network, const FixedPointNetwork& fixed,
+                               ThreadPool& pool) {
   const Builder builder(network, fixed);
   const ValueShape &in = builder.shapes().front(), &out = builder.shapes().back();
   input_count_ = size_t{in.size} * in.size * in.channels;
-  FIG_CHECK(input_.ensure(input_count_) && output_.ensure(size_t{out.size} * out.size * out.channels), "memory");
+  FIG_CHECK(
+      input_.ensure(input_count_) && output_.ensure(size_t{out.size} * out.size * out.channels),
+      "memory");
   xnn_runtime_t runtime = nullptr;
   check(xnn_create_runtime_v4(builder.subgraph(), nullptr, nullptr, pool.handle(), 0, &runtime));
   runtime_.reset(runtime);

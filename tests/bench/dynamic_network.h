@@ -1,5 +1,6 @@
-// The network with int8 weights and activations whose ranges are found at run time (XNNPACK's qd8_f32_qc8w): what fixed point is measured
-// against. Values between the layers are float; its results differ between CPUs, so the runtime has no use for it.
+// The network with int8 weights and activations whose ranges are found at run time (XNNPACK's
+// qd8_f32_qc8w): what fixed point is measured against. Values between the layers are float; its
+// results differ between CPUs, so the runtime has no use for it.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,5 @@
-// Shape directions, maps and Fourier channels (formats/src/body.cpp) beyond what the five texels cover.
+// Shape directions, maps and Fourier channels (formats/src/body.cpp) beyond what the five texels
+// cover.
 #include "figurine/body.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +24,8 @@ TEST(ShapeBody, NoCoefficientsGiveTheMeanTemplateToTheBit) {
 }
 
 TEST(PoseMaps, MovingTheRootMovesNothingInTheMaps) {
-  // World orientation stays in the maps, world position does not: |root| = 1 km would swallow the millimetres otherwise.
+  // World orientation stays in the maps, world position does not: |root| = 1 km would swallow the
+  // millimetres otherwise.
   FiveTexels example;
   const size_t size = size_t(example.body.uv_size) * example.body.uv_size * kMapChannels;
   std::vector<Affine> scratch(example.body.joint_count());
@@ -33,7 +35,8 @@ TEST(PoseMaps, MovingTheRootMovesNothingInTheMaps) {
   example.pose.root_translation_m = {10.0f, -3.0f, 7.0f};
   draw_pose_maps(example.body, example.pose, example.statistics, scratch, kMapChannels, there);
   for (size_t i = 0; i < size; ++i) near_error.add(there[i], here[i]);
-  EXPECT_LE(near_error.largest(), 1e-5);  // float's step at 10 m is 9.5e-7 m; a few roundings, times the scale 2
+  EXPECT_LE(near_error.largest(),
+            1e-5);  // float's step at 10 m is 9.5e-7 m; a few roundings, times the scale 2
 }
 
 TEST(PoseMaps, TurningTheRootTurnsPositionsAndNormals) {
@@ -43,8 +46,10 @@ TEST(PoseMaps, TurningTheRootTurnsPositionsAndNormals) {
   std::vector<Affine> scratch(example.body.joint_count());
   std::vector<float> before(texels * kMapChannels), after(texels * kMapChannels);
   draw_pose_maps(example.body, example.pose, raw, scratch, kMapChannels, before);
-  // A quarter turn about y in front of the root's own rotation: q' = (s, 0, s, 0) q, unnormalised with s = 1.
-  const float w = example.rotations[0], x = example.rotations[1], y = example.rotations[2], z = example.rotations[3];
+  // A quarter turn about y in front of the root's own rotation: q' = (s, 0, s, 0) q, unnormalised
+  // with s = 1.
+  const float w = example.rotations[0], x = example.rotations[1], y = example.rotations[2],
+              z = example.rotations[3];
   const float turned[4] = {w - y, x + z, y + w, z - x};
   std::copy(turned, turned + 4, example.rotations.begin());
   draw_pose_maps(example.body, example.pose, raw, scratch, kMapChannels, after);
@@ -72,7 +77,8 @@ TEST(FourierChannels, AreSinesAndCosinesOfTexelCentres) {
       EXPECT_EQ(texel[0], -7.0f);
       EXPECT_EQ(texel[kStride - 1], -7.0f);
       for (uint32_t o = 0; o < kOctaves; ++o) {
-        const double angle_u = M_PI * (1 << o) * (u + 0.5) / kSize, angle_v = M_PI * (1 << o) * (v + 0.5) / kSize;
+        const double angle_u = M_PI * (1 << o) * (u + 0.5) / kSize,
+                     angle_v = M_PI * (1 << o) * (v + 0.5) / kSize;
         error.add(texel[1 + 4 * o + 0], std::sin(angle_u));
         error.add(texel[1 + 4 * o + 1], std::cos(angle_u));
         error.add(texel[1 + 4 * o + 2], std::sin(angle_v));

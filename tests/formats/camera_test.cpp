@@ -24,7 +24,8 @@ Seen project(const Camera& camera, const std::array<double, 3>& world) {
     const float* row = &camera.view_from_world[4 * i];
     view[i] = row[0] * world[0] + row[1] * world[1] + row[2] * world[2] + row[3];
   }
-  return {camera.fx_px * view[0] / view[2] + camera.cx_px, camera.fy_px * view[1] / view[2] + camera.cy_px, view[2]};
+  return {camera.fx_px * view[0] / view[2] + camera.cx_px,
+          camera.fy_px * view[1] / view[2] + camera.cy_px, view[2]};
 }
 
 Camera orbit(const OrbitCamera& options) {
@@ -34,12 +35,15 @@ Camera orbit(const OrbitCamera& options) {
 }
 
 TEST(OrbitCamera, IsOrthonormalRightHandedAndSeesItsTargetAtTheCentre) {
-  LargestError orthonormality("R R^T - I"), centre("target at the image centre [px]"), depth("distance, relative");
+  LargestError orthonormality("R R^T - I"), centre("target at the image centre [px]"),
+      depth("distance, relative");
   for (float azimuth : {-540.0f, -180.0f, -90.0f, -1.0f, 0.0f, 30.0f, 90.0f, 179.0f, 1000.0f}) {
     for (float elevation : {-89.0f, -45.0f, 0.0f, 10.0f, 89.0f}) {
       for (float distance : {0.1f, 3.0f, 100.0f}) {
-        const Camera camera =
-            orbit({.azimuth_deg = azimuth, .elevation_deg = elevation, .distance_m = distance, .target_m = {0.5f, 1.0f, -2.0f}});
+        const Camera camera = orbit({.azimuth_deg = azimuth,
+                                     .elevation_deg = elevation,
+                                     .distance_m = distance,
+                                     .target_m = {0.5f, 1.0f, -2.0f}});
         const std::array<float, 12>& m = camera.view_from_world;
         for (int i = 0; i < 3; ++i) {
           for (int j = 0; j < 3; ++j) {
@@ -49,11 +53,13 @@ TEST(OrbitCamera, IsOrthonormalRightHandedAndSeesItsTargetAtTheCentre) {
           }
         }
         const double determinant = m[0] * (double(m[5]) * m[10] - double(m[6]) * m[9]) -
-                                   m[1] * (double(m[4]) * m[10] - double(m[6]) * m[8]) + m[2] * (double(m[4]) * m[9] - double(m[5]) * m[8]);
+                                   m[1] * (double(m[4]) * m[10] - double(m[6]) * m[8]) +
+                                   m[2] * (double(m[4]) * m[9] - double(m[5]) * m[8]);
         orthonormality.add(determinant, 1);
         const Seen seen = project(camera, {0.5, 1.0, -2.0});
         depth.add(seen.depth_m / distance, 1);
-        // The translation is rounded to float: at 10 cm one of 2.3 m loses 1e-7 m, which is 1e-6 of the distance.
+        // The translation is rounded to float: at 10 cm one of 2.3 m loses 1e-7 m, which is 1e-6 of
+        // the distance.
         centre.add((seen.x_px - 320) * distance / camera.fx_px, 0);
         centre.add((seen.y_px - 240) * distance / camera.fy_px, 0);
       }
@@ -67,7 +73,8 @@ TEST(OrbitCamera, IsOrthonormalRightHandedAndSeesItsTargetAtTheCentre) {
 TEST(OrbitCamera, UpInTheWorldIsUpInTheImageAndPlusXIsTheFiguresLeft) {
   const Camera front = orbit({});
   EXPECT_LT(project(front, {0, 0.5, 0}).y_px, 240);  // y down in the image
-  EXPECT_GT(project(front, {0.5, 0, 0}).x_px, 320);  // a figure that faces the camera has its left hand on the right of the image
+  EXPECT_GT(project(front, {0.5, 0, 0}).x_px,
+            320);  // a figure that faces the camera has its left hand on the right of the image
   const Camera left = orbit({.azimuth_deg = 90});
   EXPECT_LT(project(left, {0.5, 0, 0}).depth_m, 3);  // the camera went to +x
   const Camera above = orbit({.elevation_deg = 60});
@@ -85,10 +92,12 @@ TEST(OrbitCamera, FieldOfViewSpansTheImageHeight) {
 
 TEST(OrbitCamera, RejectsValuesOutsideItsRanges) {
   for (const OrbitCamera& bad :
-       {OrbitCamera{.azimuth_deg = kNan}, OrbitCamera{.azimuth_deg = kInfinity}, OrbitCamera{.elevation_deg = 90},
-        OrbitCamera{.elevation_deg = kNan}, OrbitCamera{.distance_m = 0}, OrbitCamera{.distance_m = -1},
-        OrbitCamera{.distance_m = kInfinity}, OrbitCamera{.vertical_fov_deg = 0.5f}, OrbitCamera{.vertical_fov_deg = 171},
-        OrbitCamera{.vertical_fov_deg = kNan}, OrbitCamera{.target_m = {kNan, 0, 0}}}) {
+       {OrbitCamera{.azimuth_deg = kNan}, OrbitCamera{.azimuth_deg = kInfinity},
+        OrbitCamera{.elevation_deg = 90}, OrbitCamera{.elevation_deg = kNan},
+        OrbitCamera{.distance_m = 0}, OrbitCamera{.distance_m = -1},
+        OrbitCamera{.distance_m = kInfinity}, OrbitCamera{.vertical_fov_deg = 0.5f},
+        OrbitCamera{.vertical_fov_deg = 171}, OrbitCamera{.vertical_fov_deg = kNan},
+        OrbitCamera{.target_m = {kNan, 0, 0}}}) {
     EXPECT_EQ(make_orbit_camera(bad, 64, 64).status().code(), StatusCode::kInvalidArgument);
   }
   EXPECT_EQ(make_orbit_camera({}, 0, 64).status().code(), StatusCode::kInvalidArgument);

@@ -1,4 +1,5 @@
-// The project's own exp, expm1, log, sine and cosine in double against libm in long double, over dense samples of their domains.
+// The project's own exp, expm1, log, sine and cosine in double against libm in long double, over
+// dense samples of their domains.
 #include "figurine/double_math.h"
 
 #include <gtest/gtest.h>
@@ -15,20 +16,26 @@ constexpr int kSamples = 400'000;
 // Places of [low, high] that no binary grid favours.
 template <class Visit>
 void for_each_place(double low, double high, const Visit& visit) {
-  for (int i = 0; i <= kSamples; ++i) visit(low + (high - low) * (static_cast<double>(i) / kSamples));
+  for (int i = 0; i <= kSamples; ++i)
+    visit(low + (high - low) * (static_cast<double>(i) / kSamples));
 }
 
 // Both signs, 1e-12 to `high` in equal ratios.
 template <class Visit>
 void for_each_size(double high, const Visit& visit) {
-  for_each_place(std::log(1e-12), std::log(high), [&](double l) { visit(std::exp(l)), visit(-std::exp(l)); });
+  for_each_place(std::log(1e-12), std::log(high),
+                 [&](double l) { visit(std::exp(l)), visit(-std::exp(l)); });
 }
 
-double relative(double value, long double truth) { return static_cast<double>((value - truth) / truth); }
+double relative(double value, long double truth) {
+  return static_cast<double>((value - truth) / truth);
+}
 
 TEST(DoubleMath, ExpErrorIsWithinItsStatement) {
   LargestError error("exp, relative");
-  const auto add = [&](double x) { error.add(relative(exp_double(x), std::exp(static_cast<long double>(x)))); };
+  const auto add = [&](double x) {
+    error.add(relative(exp_double(x), std::exp(static_cast<long double>(x))));
+  };
   for_each_place(-707.99, 709.78, add);
   for_each_size(50, add);
   EXPECT_LE(error.largest(), 2e-16);
@@ -46,7 +53,9 @@ TEST(DoubleMath, ExpHasTheRightLimits) {
 
 TEST(DoubleMath, Expm1ErrorIsWithinItsStatement) {
   LargestError error("expm1, relative");
-  const auto add = [&](double x) { error.add(relative(expm1_double(x), std::expm1(static_cast<long double>(x)))); };
+  const auto add = [&](double x) {
+    error.add(relative(expm1_double(x), std::expm1(static_cast<long double>(x))));
+  };
   for_each_place(-1, 1, [&](double x) {
     if (x != 0) add(x);
   });
@@ -59,7 +68,9 @@ TEST(DoubleMath, Expm1ErrorIsWithinItsStatement) {
 
 TEST(DoubleMath, LogErrorIsWithinItsStatement) {
   LargestError error("log, relative");
-  const auto add = [&](double x) { error.add(relative(log_double(x), std::log(static_cast<long double>(x)))); };
+  const auto add = [&](double x) {
+    error.add(relative(log_double(x), std::log(static_cast<long double>(x))));
+  };
   for_each_place(-708, 709, [&](double l) { add(std::exp(l)); });
   for_each_place(0.5, 1.9999, [&](double x) {
     if (x != 1) add(x);
@@ -81,8 +92,10 @@ TEST(DoubleMath, SineAndCosineErrorsAreWithinTheirStatement) {
   });
   EXPECT_LE(error.largest(), 2e-16);
   for (const double x : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-    EXPECT_EQ(sine_cosine_of_turns(x).sine, std::round(std::sin(static_cast<double>(turn) * x))) << x;
-    EXPECT_EQ(sine_cosine_of_turns(x).cosine, std::round(std::cos(static_cast<double>(turn) * x))) << x;
+    EXPECT_EQ(sine_cosine_of_turns(x).sine, std::round(std::sin(static_cast<double>(turn) * x)))
+        << x;
+    EXPECT_EQ(sine_cosine_of_turns(x).cosine, std::round(std::cos(static_cast<double>(turn) * x)))
+        << x;
   }
 }
 

@@ -1,5 +1,5 @@
-// figurine-inspect as its users meet it: exit codes, one line for each refusal, JSON that does not drift, differences that are the right
-// ones.
+// figurine-inspect as its users meet it: exit codes, one line for each refusal, JSON that does not
+// drift, differences that are the right ones.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -29,7 +29,8 @@ std::string read_text(const std::string& path) {
 // A folder of this process, gone when it ends.
 const std::string& scratch() {
   struct Folder {
-    Folder() : path(testing::TempDir() + "figurine_inspect_test_" + std::to_string(getpid()) + "/") {
+    Folder()
+        : path(testing::TempDir() + "figurine_inspect_test_" + std::to_string(getpid()) + "/") {
       std::filesystem::create_directories(path);
     }
     ~Folder() { std::filesystem::remove_all(path); }
@@ -41,19 +42,25 @@ const std::string& scratch() {
 
 std::string write_bytes(const std::string& name, const std::vector<std::byte>& bytes) {
   const std::string path = scratch() + name;
-  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
   return path;
 }
 
 // In the golden folder, so that paths in the output are short and the same everywhere.
 Outcome inspect(const std::string& arguments) {
   const std::string out = scratch() + "out", err = scratch() + "err";
-  const int status =
-      std::system(("cd '" + kGolden + "' && '" FIGURINE_INSPECT "' " + arguments + " > '" + out + "' 2> '" + err + "'").c_str());
-  return {.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1, .out = read_text(out), .err = read_text(err)};
+  const int status = std::system(("cd '" + kGolden + "' && '" FIGURINE_INSPECT "' " + arguments +
+                                  " > '" + out + "' 2> '" + err + "'")
+                                     .c_str());
+  return {.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1,
+          .out = read_text(out),
+          .err = read_text(err)};
 }
 
-bool contains(const std::string& text, const std::string& words) { return text.find(words) != std::string::npos; }
+bool contains(const std::string& text, const std::string& words) {
+  return text.find(words) != std::string::npos;
+}
 
 void expect_refused(const Outcome& run, const std::string& words) {
   EXPECT_EQ(run.exit_code, 1);
@@ -64,12 +71,14 @@ void expect_refused(const Outcome& run, const std::string& words) {
 }
 
 TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
-  for (const std::string kind : {"body", "avatar", "fixed_point_avatar", "motion", "population", "half_population", "sampler"}) {
+  for (const std::string kind : {"body", "avatar", "fixed_point_avatar", "motion", "population",
+                                 "half_population", "sampler"}) {
     const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");
     const std::string expected_path = kGolden + kind + "_v1.json";
-    if (std::getenv("FIGURINE_UPDATE_GOLDEN") != nullptr) std::ofstream(expected_path, std::ios::binary) << run.out;
+    if (std::getenv("FIGURINE_UPDATE_GOLDEN") != nullptr)
+      std::ofstream(expected_path, std::ios::binary) << run.out;
     EXPECT_EQ(run.out, read_text(expected_path)) << expected_path;
   }
 }
@@ -77,20 +86,25 @@ TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
 TEST(Inspect, PrintsWhatADeviceNeedsToKnow) {
   const Outcome avatar = inspect("avatar_v1.fgn");
   EXPECT_EQ(avatar.exit_code, 0);
-  for (const char* words : {"peak memory       1.05 MB", "MACs a frame      27352", "Gaussians         5", "metre", "OpenCV", "sRGB",
-                            "853 parameters", "fedcba98765432100123456789abcdef", "psnr_pose_db = 31.25", "CC0-1.0", "synthetic"}) {
+  for (const char* words :
+       {"peak memory       1.05 MB", "MACs a frame      27352", "Gaussians         5", "metre",
+        "OpenCV", "sRGB", "853 parameters", "fedcba98765432100123456789abcdef",
+        "psnr_pose_db = 31.25", "CC0-1.0", "synthetic"}) {
     EXPECT_TRUE(contains(avatar.out, words)) << words << "\n" << avatar.out;
   }
   EXPECT_FALSE(contains(avatar.out, "network.0.weights"));
   const Outcome fixed = inspect("fixed_point_avatar_v1.fgn --tensors");
   for (const char* words :
-       {"precision         q8", "in fixed point 55556666777788881111222233334444 by sample library 1", "fixed.0.weights", "i8 ",
-        "input int16             0.000244141     0", "0     conv 3x3 relu           0.125  -128", "23    conv 1x1                float"}) {
+       {"precision         q8",
+        "in fixed point 55556666777788881111222233334444 by sample library 1", "fixed.0.weights",
+        "i8 ", "input int16             0.000244141     0",
+        "0     conv 3x3 relu           0.125  -128", "23    conv 1x1                float"}) {
     EXPECT_TRUE(contains(fixed.out, words)) << words << "\n" << fixed.out;
   }
   EXPECT_FALSE(contains(avatar.out + inspect("avatar_v1.fgn --tensors").out, "weight scale"));
   const Outcome body = inspect("body_v1.fgn --tensors");
-  for (const char* words : {"0 pelvis  1 spine1  2 head", "rest pose", "8x8 texels, 5 covered, 3 border", "body.texel_weights", "[5,8]"}) {
+  for (const char* words : {"0 pelvis  1 spine1  2 head", "rest pose",
+                            "8x8 texels, 5 covered, 3 border", "body.texel_weights", "[5,8]"}) {
     EXPECT_TRUE(contains(body.out, words)) << words << "\n" << body.out;
   }
 }
@@ -99,29 +113,37 @@ TEST(Inspect, ListsThePopulationsMembers) {
   const Outcome run = inspect("population_v1.fgn --tensors");
   EXPECT_EQ(run.exit_code, 0) << run.err;
   for (const char* words :
-       {"members           3: 1 train, 1 validation, 1 test", "int8, one scale an output channel, entropy-coded", "853 parameters",
-        "number  name     split           bytes  psnr_pose_db  psnr_view_db", "not stated here; each member has its own",
-        "0  000000   train             831", "27.50             -", "1  000001   validation", "28.50         28.25",
-        "2  m\xC3\xBCller   test", "population.code", "initial.0.weights", "pose.factor               f16  [3,6]"}) {
+       {"members           3: 1 train, 1 validation, 1 test",
+        "int8, one scale an output channel, entropy-coded", "853 parameters",
+        "number  name     split           bytes  psnr_pose_db  psnr_view_db",
+        "not stated here; each member has its own", "0  000000   train             831",
+        "27.50             -", "1  000001   validation", "28.50         28.25",
+        "2  m\xC3\xBCller   test", "population.code", "initial.0.weights",
+        "pose.factor               f16  [3,6]"}) {
     EXPECT_TRUE(contains(run.out, words)) << words << "\n" << run.out;
   }
   EXPECT_TRUE(contains(inspect("half_population_v1.fgn").out, "16-bit floats"));
   const Outcome diff = inspect("population_v1.fgn --diff half_population_v1.fgn");
   EXPECT_TRUE(contains(diff.out, "/population/coding: \"q8\" -> \"f16\"")) << diff.out;
   EXPECT_TRUE(contains(diff.out, "population.difference: only in b")) << diff.out;
-  EXPECT_TRUE(contains(inspect("population_v1.fgn --diff population_v1.fgn").out, "the same content"));
+  EXPECT_TRUE(
+      contains(inspect("population_v1.fgn --diff population_v1.fgn").out, "the same content"));
 }
 
 TEST(Inspect, SaysHowASamplerSamples) {
   const Outcome run = inspect("sampler_v1.fgn --tensors");
   EXPECT_EQ(run.exit_code, 0) << run.err;
   for (const char* words :
-       {"kind              sampler", "MACs a frame      27352", "855 values on 24 directions, 16 tokens, 4639 bytes",
-        "d_model 8, 2 blocks, 2 heads, feed-forward 12, 1896 parameters, 4448 bytes", "dimension 24: 24 x SNR 0.125 at the noisy end",
-        "16 steps of dpmpp2m", "7, 16 steps of dpmpp2m: 11121314151617180102030405060708",
-        "18446744073709551615, 1000 steps of ddim: 3132333435363738", "population 51525354555657584142434445464748",
-        "14  layer 23           69        1", "15  shape               2        2", "/held_out/psnr_pose_db/0  21.25",
-        "denoiser.norm             f32  [5,2,8]", "input int16             0.000244141     0", "23    conv 1x1                float"}) {
+       {"kind              sampler", "MACs a frame      27352",
+        "855 values on 24 directions, 16 tokens, 4639 bytes",
+        "d_model 8, 2 blocks, 2 heads, feed-forward 12, 1896 parameters, 4448 bytes",
+        "dimension 24: 24 x SNR 0.125 at the noisy end", "16 steps of dpmpp2m",
+        "7, 16 steps of dpmpp2m: 11121314151617180102030405060708",
+        "18446744073709551615, 1000 steps of ddim: 3132333435363738",
+        "population 51525354555657584142434445464748", "14  layer 23           69        1",
+        "15  shape               2        2", "/held_out/psnr_pose_db/0  21.25",
+        "denoiser.norm             f32  [5,2,8]", "input int16             0.000244141     0",
+        "23    conv 1x1                float"}) {
     EXPECT_TRUE(contains(run.out, words)) << words << "\n" << run.out;
   }
 
@@ -130,9 +152,11 @@ TEST(Inspect, SaysHowASamplerSamples) {
   sample.report = "{\"held_out\": {\"psnr_pose_db\": [21.25, 20.0]}}";
   sample.sampler.report = sample.report;
   sample.matrices[5] = 0;
-  const Outcome diff = inspect("sampler_v1.fgn --diff " + write_bytes("sampler.fgn", *sample.write()));
-  for (const char* words : {"/sampler/steps: 16 -> 12", "/sampler/report/held_out/psnr_pose_db/1: 20.5 -> 20.0",
-                            "denoiser.matrices: 1 of 1408 values differ", "sampler.report: u8 [92] -> u8"}) {
+  const Outcome diff =
+      inspect("sampler_v1.fgn --diff " + write_bytes("sampler.fgn", *sample.write()));
+  for (const char* words :
+       {"/sampler/steps: 16 -> 12", "/sampler/report/held_out/psnr_pose_db/1: 20.5 -> 20.0",
+        "denoiser.matrices: 1 of 1408 values differ", "sampler.report: u8 [92] -> u8"}) {
     EXPECT_TRUE(contains(diff.out, words)) << words << "\n" << diff.out;
   }
 }
@@ -154,8 +178,10 @@ TEST(Inspect, ShowsAReportWhateverItsText) {
   // Nested beyond what a walk on the stack can bear: a text.
   const std::string deep(200'000, '[');
   EXPECT_TRUE(contains(inspected(deep, ""), "[[[["));
-  EXPECT_TRUE(contains(inspected(std::string(40, '[') + std::string(40, ']'), " --json"), "\"report\": \"[[[["));
-  EXPECT_TRUE(contains(inspected(std::string(100'000, '[') + std::string(100'000, ']'), " --json"), "\"report\": \"[[[["));
+  EXPECT_TRUE(contains(inspected(std::string(40, '[') + std::string(40, ']'), " --json"),
+                       "\"report\": \"[[[["));
+  EXPECT_TRUE(contains(inspected(std::string(100'000, '[') + std::string(100'000, ']'), " --json"),
+                       "\"report\": \"[[[["));
   const std::string many = inspected(
       "[1" + std::string(200, ' ') +
           [] {
@@ -173,7 +199,8 @@ TEST(Inspect, RefusesUnsoundPackagesWithOneLine) {
   bytes[bytes.size() / 2] ^= std::byte{4};
   expect_refused(inspect(write_bytes("flipped.fgn", bytes)), "checksum does not match");
   expect_refused(inspect(write_bytes("flipped.fgn", bytes) + " --json"), "checksum does not match");
-  expect_refused(inspect("avatar_v1.fgn --diff " + write_bytes("flipped.fgn", bytes)), "checksum does not match");
+  expect_refused(inspect("avatar_v1.fgn --diff " + write_bytes("flipped.fgn", bytes)),
+                 "checksum does not match");
   bytes.resize(100);
   expect_refused(inspect(write_bytes("cut.fgn", bytes)), "cut.fgn: header.file_bytes");
   expect_refused(inspect(write_bytes("empty.fgn", {})), "empty.fgn: header: the file has 0 bytes");
@@ -184,7 +211,8 @@ TEST(Inspect, RefusesUnsoundPackagesWithOneLine) {
 
 TEST(Inspect, WrongUsageExitsTwo) {
   for (const char* arguments :
-       {"", "--no-such-option", "avatar_v1.fgn body_v1.fgn", "avatar_v1.fgn --diff", "body_v1.fgn --diff body_v1.fgn --tensors"}) {
+       {"", "--no-such-option", "avatar_v1.fgn body_v1.fgn", "avatar_v1.fgn --diff",
+        "body_v1.fgn --diff body_v1.fgn --tensors"}) {
     const Outcome run = inspect(arguments);
     EXPECT_EQ(run.exit_code, 2) << arguments;
     EXPECT_EQ(run.out, "") << arguments;
@@ -208,9 +236,12 @@ TEST(Inspect, DiffNamesEveryDifferenceAndNoOther) {
   EXPECT_TRUE(contains(text.out, "/name: \"sample avatar\" -> \"other\"")) << text.out;
   EXPECT_TRUE(contains(text.out, "/avatar/shape/1: -1.25 -> null")) << text.out;
   EXPECT_TRUE(contains(text.out, "avatar.shape: f32 [2] -> f32 [1]")) << text.out;
-  EXPECT_TRUE(contains(text.out, "network.0.weights: 2 of 180 values differ, largest difference 0.5,")) << text.out;
+  EXPECT_TRUE(
+      contains(text.out, "network.0.weights: 2 of 180 values differ, largest difference 0.5,"))
+      << text.out;
   EXPECT_TRUE(contains(text.out, "2 fields and 2 tensors differ")) << text.out;
-  EXPECT_TRUE(contains(inspect("avatar_v1.fgn --json --diff " + other).out, "\"max_abs_difference\": 0.5"));
+  EXPECT_TRUE(
+      contains(inspect("avatar_v1.fgn --json --diff " + other).out, "\"max_abs_difference\": 0.5"));
 
   const Outcome kinds = inspect("avatar_v1.fgn --diff motion_v1.fgn");
   EXPECT_EQ(kinds.exit_code, 0);

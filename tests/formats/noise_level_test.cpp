@@ -1,4 +1,5 @@
-// Noise levels: alpha and sigma against long double, where the levels lie, and what the copied schedule ends at.
+// Noise levels: alpha and sigma against long double, where the levels lie, and what the copied
+// schedule ends at.
 #include "figurine/noise_level.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +16,9 @@ namespace {
 
 const uint64_t kDimensions[] = {1, 64, 9'886, 156'000, 598'011};
 
-NoiseSchedule schedule_of(uint64_t dimension) { return NoiseSchedule::create({.dimension = dimension}).value(); }
+NoiseSchedule schedule_of(uint64_t dimension) {
+  return NoiseSchedule::create({.dimension = dimension}).value();
+}
 
 TEST(NoiseLevel, AlphaAndSigmaAreExactAtBothEnds) {
   LargestError error("alpha and sigma, relative");
@@ -39,9 +42,10 @@ TEST(NoiseLevel, AlphaAndSigmaAreExactAtBothEnds) {
 TEST(NoiseSchedule, EndsAreWhereTheyWereAskedFor) {
   for (const uint64_t dimension : kDimensions) {
     const NoiseSchedule schedule = schedule_of(dimension);
-    const double noisy = snr(schedule.level(0)) * static_cast<double>(dimension), clean = snr(schedule.level(1));
-    std::printf("dimension %7llu: D x SNR %.17g at the noisy end, SNR %.17g at the clean end\n", static_cast<unsigned long long>(dimension),
-                noisy, clean);
+    const double noisy = snr(schedule.level(0)) * static_cast<double>(dimension),
+                 clean = snr(schedule.level(1));
+    std::printf("dimension %7llu: D x SNR %.17g at the noisy end, SNR %.17g at the clean end\n",
+                static_cast<unsigned long long>(dimension), noisy, clean);
     EXPECT_LE(noisy, 0.1 * (1 + 1e-14));
     EXPECT_NEAR(noisy, 0.1, 1e-14);
     EXPECT_NEAR(clean, 1e4, 1e-9);
@@ -122,16 +126,19 @@ TEST(LinearBeta, EndsFarFromNoise) {
   }
   EXPECT_LE(error.largest(), 1e-13);
   const double terminal = snr(levels[0]);
-  std::printf("linear beta, 500 steps: alpha^2 %.4f, SNR %.4f (%.1f dB) at the noisiest level\n", levels[0].alpha * levels[0].alpha,
-              terminal, 10 * std::log10(terminal));
+  std::printf("linear beta, 500 steps: alpha^2 %.4f, SNR %.4f (%.1f dB) at the noisiest level\n",
+              levels[0].alpha * levels[0].alpha, terminal, 10 * std::log10(terminal));
   for (const uint64_t dimension : kDimensions) {
     size_t inside = 0;
     for (const NoiseLevel& level : levels) {
       const double place = snr(level) * static_cast<double>(dimension);
       inside += place >= 0.1 && place <= 100;
     }
-    std::printf("linear beta, 500 steps, dimension %7llu: D x SNR %.3g at the noisiest level, %.1f %% of the levels in the band\n",
-                static_cast<unsigned long long>(dimension), terminal * static_cast<double>(dimension), 100.0 * double(inside) / 501);
+    std::printf(
+        "linear beta, 500 steps, dimension %7llu: D x SNR %.3g at the noisiest level, %.1f %% of "
+        "the levels in the band\n",
+        static_cast<unsigned long long>(dimension), terminal * static_cast<double>(dimension),
+        100.0 * double(inside) / 501);
   }
   EXPECT_NEAR(levels[0].alpha * levels[0].alpha, 0.0064, 5e-5);
   EXPECT_EQ(levels.back().lambda, INFINITY);

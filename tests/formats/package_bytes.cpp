@@ -46,7 +46,8 @@ Seal::Seal(std::span<const std::byte> sound_package) {
     const std::byte* begin = sound_package.data() + header.index_offset;
     const void* found = memmem(begin, header.index_bytes, extent, sizeof(extent));
     FIG_CHECK(found != nullptr, "the extent is in the index");
-    extents_.push_back(static_cast<size_t>(static_cast<const std::byte*>(found) - sound_package.data()));
+    extents_.push_back(
+        static_cast<size_t>(static_cast<const std::byte*>(found) - sound_package.data()));
   }
 }
 
@@ -54,11 +55,13 @@ void Seal::renew(std::span<std::byte> bytes) const {
   for (size_t at : extents_) {
     if (at + 24 > bytes.size()) continue;
     const uint64_t offset = get_u64(bytes, at), size = get_u64(bytes, at + 8);
-    if (offset <= bytes.size() && size <= bytes.size() - offset) put_u64(bytes, at + 16, xxh3_64(bytes.subspan(offset, size)));
+    if (offset <= bytes.size() && size <= bytes.size() - offset)
+      put_u64(bytes, at + 16, xxh3_64(bytes.subspan(offset, size)));
   }
   if (bytes.size() < kPackageHeaderBytes) return;
   layout::Header header = get_header(bytes);
-  if (header.index_offset <= bytes.size() && header.index_bytes <= bytes.size() - header.index_offset) {
+  if (header.index_offset <= bytes.size() &&
+      header.index_bytes <= bytes.size() - header.index_offset) {
     header.index_checksum = xxh3_64(bytes.subspan(header.index_offset, header.index_bytes));
   }
   put_header(bytes, header);
@@ -72,13 +75,17 @@ void renew_what_looks_like_a_package(std::span<std::byte> bytes) {
   header.required_features &= layout::kKnownRequiredFeatures;
   header.file_bytes = bytes.size();
   header.index_offset = kPackageHeaderBytes;
-  const size_t index_bytes = std::min<size_t>(header.index_bytes, bytes.size() - kPackageHeaderBytes);
+  const size_t index_bytes =
+      std::min<size_t>(header.index_bytes, bytes.size() - kPackageHeaderBytes);
   header.index_bytes = static_cast<uint32_t>(index_bytes);
   // Whatever could be an extent of the index is given the checksum of what it covers.
   for (size_t at = kPackageHeaderBytes; at + 24 <= kPackageHeaderBytes + index_bytes; at += 8) {
     const uint64_t offset = get_u64(bytes, at), size = get_u64(bytes, at + 8);
-    if (offset % kBlobAlignment != 0 || offset < kPackageHeaderBytes + index_bytes || offset > bytes.size()) continue;
-    if (size != 0 && size <= bytes.size() - offset) put_u64(bytes, at + 16, xxh3_64(bytes.subspan(offset, size)));
+    if (offset % kBlobAlignment != 0 || offset < kPackageHeaderBytes + index_bytes ||
+        offset > bytes.size())
+      continue;
+    if (size != 0 && size <= bytes.size() - offset)
+      put_u64(bytes, at + 16, xxh3_64(bytes.subspan(offset, size)));
   }
   header.index_checksum = xxh3_64(bytes.subspan(kPackageHeaderBytes, index_bytes));
   put_header(bytes, header);
@@ -96,7 +103,9 @@ void put_header(std::span<std::byte> bytes, layout::Header header) {
   std::memcpy(bytes.data(), &header, sizeof(header));
 }
 
-void put_u64(std::span<std::byte> bytes, size_t at, uint64_t value) { std::memcpy(bytes.data() + at, &value, sizeof(value)); }
+void put_u64(std::span<std::byte> bytes, size_t at, uint64_t value) {
+  std::memcpy(bytes.data() + at, &value, sizeof(value));
+}
 
 uint64_t get_u64(std::span<const std::byte> bytes, size_t at) {
   uint64_t value = 0;
@@ -129,20 +138,24 @@ bool exercise_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& s
   if (!avatar.holds(Precision::kFixedPoint)) return avatar.holds(Precision::kFloat32);
   if (!validate_fixed_point(avatar.network, avatar.fixed_point).ok()) return false;
   if (count_macs(avatar.network, shapes) > 10'000'000) return true;  // a mutation may ask for hours
-  const std::vector<int16_t> input(size_t{shapes[0].size} * shapes[0].size * shapes[0].channels, -32767);
+  const std::vector<int16_t> input(size_t{shapes[0].size} * shapes[0].size * shapes[0].channels,
+                                   -32767);
   return all_finite(evaluate_fixed_point(avatar.network, avatar.fixed_point, input).result);
 }
 
 bool exercise_golden(const GoldenFrame& golden) {
   if (golden.rotations.empty()) return golden.png.empty();
   const uint32_t joints = static_cast<uint32_t>(golden.rotations.size() / 4);
-  return validate_camera(golden.camera).ok() && validate_pose({golden.root_translation_m, golden.rotations}, joints).ok();
+  return validate_camera(golden.camera).ok() &&
+         validate_pose({golden.root_translation_m, golden.rotations}, joints).ok();
 }
 
 bool exercise_avatar(const Avatar& avatar, std::string& reason) {
   reason = "shapes or weights of the network";
-  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, avatar.holds(Precision::kFloat32));
-  if (!shapes.ok() || shapes->back().channels != head_channels(avatar.decoding.sh_degree)) return false;
+  const Result<std::vector<ValueShape>> shapes =
+      infer_shapes(avatar.network, avatar.holds(Precision::kFloat32));
+  if (!shapes.ok() || shapes->back().channels != head_channels(avatar.decoding.sh_degree))
+    return false;
   for (const Layer& layer : avatar.network.layers) {
     if (!all_finite(layer.weights) || !all_finite(layer.bias)) return false;
   }
@@ -150,8 +163,12 @@ bool exercise_avatar(const Avatar& avatar, std::string& reason) {
   if (!exercise_fixed_point(avatar, *shapes)) return false;
   reason = "shape or pose statistics";
   const size_t features = avatar.pose_statistics.joints.size() * 3;
-  if (avatar.pose_statistics.mean.size() != features || avatar.pose_statistics.covariance.size() != features * features) return false;
-  if (!all_finite(avatar.shape) || !all_finite(avatar.pose_statistics.mean) || !all_finite(avatar.pose_statistics.covariance)) return false;
+  if (avatar.pose_statistics.mean.size() != features ||
+      avatar.pose_statistics.covariance.size() != features * features)
+    return false;
+  if (!all_finite(avatar.shape) || !all_finite(avatar.pose_statistics.mean) ||
+      !all_finite(avatar.pose_statistics.covariance))
+    return false;
   reason = "golden frame";
   return exercise_golden(avatar.golden);
 }
@@ -161,16 +178,19 @@ bool exercise_population(const Population& population, std::string& reason) {
   const size_t floats = member_floats(population);
   for (size_t m = 0; m < population.size(); ++m) {
     const ExactBytes storage(std::vector<std::byte>(floats * sizeof(float)));
-    const Avatar avatar = open_member(population, m, {reinterpret_cast<float*>(storage.bytes().data()), floats});
+    const Avatar avatar =
+        open_member(population, m, {reinterpret_cast<float*>(storage.bytes().data()), floats});
     if (!exercise_avatar(avatar, reason)) return false;
     reason = "a member's name or quality";
-    if (find_member(population, avatar.name) != m || population.members[m].quality.size() != population.quality_names.size()) return false;
+    if (find_member(population, avatar.name) != m ||
+        population.members[m].quality.size() != population.quality_names.size())
+      return false;
   }
   return true;
 }
 
-// What a device does with a sampler, with its products in plain loops: the first direction of every token to weights, an evaluation of each
-// matrix, the noise levels of its steps.
+// What a device does with a sampler, with its products in plain loops: the first direction of every
+// token to weights, an evaluation of each matrix, the noise levels of its steps.
 bool exercise_sampler(const Sampler& sampler, std::string& reason) {
   reason = "the values' quantisation";
   if (!validate_quantisation(sampler.network, sampler.values).ok()) return false;
@@ -182,25 +202,36 @@ bool exercise_sampler(const Sampler& sampler, std::string& reason) {
     for (size_t k = 0; k < sampler.ranks[token]; ++k, ++direction) {
       for (size_t i = 0; i < tokens[token]; ++i, ++byte) {
         const int8_t q = sampler.directions[byte];
-        if (q < -127 || !std::isfinite(sampler.mean[value + i] + sampler.direction_scale[direction] * static_cast<float>(q))) return false;
+        if (q < -127 || !std::isfinite(sampler.mean[value + i] +
+                                       sampler.direction_scale[direction] * static_cast<float>(q)))
+          return false;
       }
     }
     value += tokens[token];
   }
-  if (value != sampler.mean.size() || direction != sampler.direction_scale.size() || byte != sampler.directions.size()) return false;
+  if (value != sampler.mean.size() || direction != sampler.direction_scale.size() ||
+      byte != sampler.directions.size())
+    return false;
   reason = "the denoiser";
   size_t row = 0;
   byte = 0;
   for (const MatrixShape& matrix : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
     for (uint32_t n = 0; n < matrix.rows; ++n, ++row) {
       float sum = 0;
-      for (uint32_t k = 0; k < matrix.columns; ++k) sum += static_cast<float>(sampler.matrices[byte++]);
-      if (!std::isfinite(sampler.row_scale[row] * sum + sampler.bias[row]) || !(sampler.row_scale[row] > 0)) return false;
+      for (uint32_t k = 0; k < matrix.columns; ++k)
+        sum += static_cast<float>(sampler.matrices[byte++]);
+      if (!std::isfinite(sampler.row_scale[row] * sum + sampler.bias[row]) ||
+          !(sampler.row_scale[row] > 0))
+        return false;
     }
   }
   const size_t d = sampler.denoiser.d_model;
-  if (byte != sampler.matrices.size() || row != sampler.bias.size() || sampler.position.size() != (tokens.size() + 1) * d) return false;
-  if (sampler.norm.size() != (2 * sampler.denoiser.blocks + 1) * 2 * d || d % (2 * sampler.denoiser.heads) != 0) return false;
+  if (byte != sampler.matrices.size() || row != sampler.bias.size() ||
+      sampler.position.size() != (tokens.size() + 1) * d)
+    return false;
+  if (sampler.norm.size() != (2 * sampler.denoiser.blocks + 1) * 2 * d ||
+      d % (2 * sampler.denoiser.heads) != 0)
+    return false;
   if (!all_finite(sampler.position) || !all_finite(sampler.norm)) return false;
   reason = "the noise schedule";
   const Result<NoiseSchedule> schedule = NoiseSchedule::create(sampler.noise);
@@ -212,8 +243,11 @@ bool exercise_sampler(const Sampler& sampler, std::string& reason) {
   }
   reason = "pose statistics, golden pose or report";
   const size_t features = sampler.pose_statistics.joints.size() * 3;
-  if (sampler.pose_statistics.mean.size() != features || sampler.pose_statistics.covariance.size() != features * features) return false;
-  return is_clean_text(sampler.report, true) && sampler.golden.png.empty() && exercise_golden(sampler.golden);
+  if (sampler.pose_statistics.mean.size() != features ||
+      sampler.pose_statistics.covariance.size() != features * features)
+    return false;
+  return is_clean_text(sampler.report, true) && sampler.golden.png.empty() &&
+         exercise_golden(sampler.golden);
 }
 
 }  // namespace
@@ -228,12 +262,15 @@ bool exercise(const Package& package, std::string& reason) {
       const Motion& motion = package.motion();
       reason = "a pose";
       for (uint32_t frame = 0; frame < motion.frame_count; ++frame) {
-        if (!validate_pose(motion.pose(frame), static_cast<uint32_t>(motion.joint_names.size())).ok()) return false;
+        if (!validate_pose(motion.pose(frame), static_cast<uint32_t>(motion.joint_names.size()))
+                 .ok())
+          return false;
       }
       return true;
     }
     case PackageKind::kPopulation: {
-      for (size_t m = 0; m < package.population().size(); ++m) static_cast<void>(package.member_provenance(m));
+      for (size_t m = 0; m < package.population().size(); ++m)
+        static_cast<void>(package.member_provenance(m));
       return exercise_population(package.population(), reason);
     }
     case PackageKind::kSampler:

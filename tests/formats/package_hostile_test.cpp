@@ -1,5 +1,5 @@
-// The container against damage and malice: whatever is cut, flipped, appended, moved or newer is refused with a reason, and nothing outside
-// the bytes is read.
+// The container against damage and malice: whatever is cut, flipped, appended, moved or newer is
+// refused with a reason, and nothing outside the bytes is read.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -33,7 +33,8 @@ Status open_status(std::span<const std::byte> bytes) {
 void expect_refused(const Status& status, StatusCode code, const std::string& words) {
   EXPECT_STREQ(to_string(status.code()), to_string(code)) << status.message();
   EXPECT_EQ(status.message().rfind("hostile.fgn: ", 0), 0u) << status.message();
-  EXPECT_NE(status.message().find(words), std::string::npos) << status.message() << " should mention: " << words;
+  EXPECT_NE(status.message().find(words), std::string::npos)
+      << status.message() << " should mention: " << words;
   EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
 }
 
@@ -48,7 +49,8 @@ INSTANTIATE_TEST_SUITE_P(EachKind, PackageOpen, testing::ValuesIn(samples::kSamp
 TEST_P(PackageOpen, RejectsEveryPrefix) {
   const Bytes bytes = sound();
   for (size_t length = 0; length < bytes.size(); ++length) {
-    ASSERT_EQ(open_status(std::span(bytes).first(length)).code(), StatusCode::kCorrupt) << length << " of " << bytes.size() << " bytes";
+    ASSERT_EQ(open_status(std::span(bytes).first(length)).code(), StatusCode::kCorrupt)
+        << length << " of " << bytes.size() << " bytes";
   }
   EXPECT_TRUE(open_status(bytes).ok());
 }
@@ -62,7 +64,8 @@ TEST_P(PackageOpen, RejectsEveryPrefixWithALengthToMatch) {
     header.file_bytes = length;
     put_header(cut, header);
     seal.renew(cut);
-    ASSERT_EQ(open_status(cut).code(), StatusCode::kCorrupt) << length << " of " << bytes.size() << " bytes";
+    ASSERT_EQ(open_status(cut).code(), StatusCode::kCorrupt)
+        << length << " of " << bytes.size() << " bytes";
   }
 }
 
@@ -74,7 +77,8 @@ TEST_P(PackageOpen, RejectsEveryFlippedBit) {
       if (i >= kPackageHeaderBytes + get_header(bytes).index_bytes && bit != int(i % 8)) continue;
       const std::byte flip{static_cast<uint8_t>(1u << bit)};
       bytes[i] ^= flip;
-      ASSERT_EQ(open_status(bytes).code(), StatusCode::kCorrupt) << "bit " << bit << " of byte " << i;
+      ASSERT_EQ(open_status(bytes).code(), StatusCode::kCorrupt)
+          << "bit " << bit << " of byte " << i;
       bytes[i] ^= flip;
     }
   }
@@ -109,8 +113,10 @@ TEST_P(PackageOpen, RejectsEachUnknownRequiredFeatureAndIgnoresOptionalOnes) {
     layout::Header header = get_header(bytes);
     header.required_features = own ^ uint64_t { 1 } << bit;
     put_header(bytes, header);
-    const bool known = (layout::kKnownRequiredFeatures >> bit & 1) != 0;  // and not what the package holds
-    expect_refused(open_status(bytes), known ? StatusCode::kCorrupt : StatusCode::kUnsupported, "header.required_features");
+    const bool known =
+        (layout::kKnownRequiredFeatures >> bit & 1) != 0;  // and not what the package holds
+    expect_refused(open_status(bytes), known ? StatusCode::kCorrupt : StatusCode::kUnsupported,
+                   "header.required_features");
     header.required_features = own;
     header.optional_features = uint64_t{1} << bit;
     put_header(bytes, header);
@@ -149,7 +155,8 @@ TEST_P(PackageOpen, RejectsIndexOutOfPlace) {
   expect_refused(with(0, size), StatusCode::kCorrupt, "header.index_offset");
   expect_refused(with(128, size), StatusCode::kCorrupt, "header.index_offset");
   expect_refused(with(64, 0), StatusCode::kCorrupt, "header.index_bytes");
-  expect_refused(with(64, static_cast<uint32_t>(bytes.size()) - 63), StatusCode::kCorrupt, "header.index_bytes");
+  expect_refused(with(64, static_cast<uint32_t>(bytes.size()) - 63), StatusCode::kCorrupt,
+                 "header.index_bytes");
   expect_refused(with(64, UINT32_MAX), StatusCode::kLimitExceeded, "header.index_bytes");
   expect_refused(with(64, size - 1), StatusCode::kCorrupt, "header.index_checksum");
 }
@@ -165,7 +172,8 @@ TEST_P(PackageOpen, RejectsBlobsPastTheEndOverlappingOrApart) {
   };
   for (size_t blob = 0; blob < seal.blob_count(); ++blob) {
     const uint64_t offset = get_u64(bytes, seal.extent_at(blob));
-    expect_refused(with(blob, layout::align_up(bytes.size())), StatusCode::kCorrupt, "past the end");
+    expect_refused(with(blob, layout::align_up(bytes.size())), StatusCode::kCorrupt,
+                   "past the end");
     expect_refused(with(blob, uint64_t{0} - 64), StatusCode::kCorrupt, "past the end");
     expect_refused(with(blob, uint64_t{1} << 63), StatusCode::kCorrupt, "past the end");
     expect_refused(with(blob, offset + 4), StatusCode::kCorrupt, "multiple of 64");
@@ -173,7 +181,8 @@ TEST_P(PackageOpen, RejectsBlobsPastTheEndOverlappingOrApart) {
     expect_refused(with(blob, offset - 64), StatusCode::kCorrupt, "overlaps");
     if (blob + 1 < seal.blob_count()) {
       const uint64_t size = get_u64(bytes, seal.extent_at(blob) + 8);
-      if (offset + 64 + size <= bytes.size()) expect_refused(with(blob, offset + 64), StatusCode::kCorrupt, "leaves a gap");
+      if (offset + 64 + size <= bytes.size())
+        expect_refused(with(blob, offset + 64), StatusCode::kCorrupt, "leaves a gap");
     }
     Bytes changed = bytes;
     put_u64(changed, seal.extent_at(blob) + 8, get_u64(changed, seal.extent_at(blob) + 8) + 4);
@@ -186,9 +195,12 @@ TEST_P(PackageOpen, RejectsEveryPaddingByteThatIsNotZero) {
   Bytes bytes = sound();
   const Seal seal(bytes);
   std::vector<bool> padding(bytes.size(), true);
-  const auto mark = [&](uint64_t begin, uint64_t size) { std::fill_n(padding.begin() + ptrdiff_t(begin), size, false); };
+  const auto mark = [&](uint64_t begin, uint64_t size) {
+    std::fill_n(padding.begin() + ptrdiff_t(begin), size, false);
+  };
   mark(0, kPackageHeaderBytes + get_header(bytes).index_bytes);
-  for (size_t i = 0; i < seal.blob_count(); ++i) mark(get_u64(bytes, seal.extent_at(i)), get_u64(bytes, seal.extent_at(i) + 8));
+  for (size_t i = 0; i < seal.blob_count(); ++i)
+    mark(get_u64(bytes, seal.extent_at(i)), get_u64(bytes, seal.extent_at(i) + 8));
   size_t checked = 0;
   for (size_t i = 0; i < bytes.size(); ++i) {
     if (!padding[i]) continue;
@@ -221,7 +233,8 @@ TEST_P(PackageOpen, RejectsMisalignedMemory) {
   for (size_t shift : {1, 4, 8, 16, 32}) {
     std::byte* start = const_cast<std::byte*>(aligned.bytes().data()) + shift;
     std::memcpy(start, bytes.data(), bytes.size());
-    expect_refused(Package::open({start, bytes.size()}, "hostile.fgn").status(), StatusCode::kInvalidArgument, "64-byte aligned");
+    expect_refused(Package::open({start, bytes.size()}, "hostile.fgn").status(),
+                   StatusCode::kInvalidArgument, "64-byte aligned");
   }
 }
 
@@ -237,7 +250,11 @@ Status open_parts(const std::function<void(PackageParts&)>& bend) {
 
 BlobPart extra_blob(const std::string& name, bool optional) {
   static const uint32_t kValues[3] = {1, 2, 3};
-  return {.name = name, .type = DataType::kU32, .shape = {3}, .bytes = std::as_bytes(std::span(kValues)), .optional = optional};
+  return {.name = name,
+          .type = DataType::kU32,
+          .shape = {3},
+          .bytes = std::as_bytes(std::span(kValues)),
+          .optional = optional};
 }
 
 TEST(PackageBlobs, SkipsUnknownOptionalBlobsAnywhere) {
@@ -250,22 +267,30 @@ TEST(PackageBlobs, SkipsUnknownOptionalBlobsAnywhere) {
     ASSERT_TRUE(package.ok()) << package.status().message();
     EXPECT_EQ(package->tensors().size(), 3u);
     EXPECT_EQ(package->tensors()[place].name, "motion.contacts");
-    EXPECT_TRUE(std::equal(sample.rotations.begin(), sample.rotations.end(), package->motion().rotations.begin()));
+    EXPECT_TRUE(std::equal(sample.rotations.begin(), sample.rotations.end(),
+                           package->motion().rotations.begin()));
   }
 }
 
 TEST(PackageBlobs, RejectsUnknownBlobsThatAreNotOptional) {
-  expect_refused(open_parts([](PackageParts& parts) { parts.blobs.push_back(extra_blob("motion.contacts", false)); }),
+  expect_refused(open_parts([](PackageParts& parts) {
+                   parts.blobs.push_back(extra_blob("motion.contacts", false));
+                 }),
                  StatusCode::kUnsupported, "motion.contacts");
 }
 
 TEST(PackageBlobs, RejectsMissingTwiceAndMisnamed) {
-  expect_refused(open_parts([](PackageParts& parts) { parts.blobs.pop_back(); }), StatusCode::kCorrupt, "motion.rotations: is missing");
-  expect_refused(open_parts([](PackageParts& parts) { parts.blobs.clear(); }), StatusCode::kCorrupt, "is missing");
-  expect_refused(open_parts([](PackageParts& parts) { parts.blobs.push_back(parts.blobs[0]); }), StatusCode::kCorrupt, "twice");
-  for (const std::string& name : {std::string(), std::string("Motion"), std::string("a b"), std::string("x\ny"), std::string(65, 'a')}) {
-    expect_refused(open_parts([&](PackageParts& parts) { parts.blobs.push_back(extra_blob(name, true)); }), StatusCode::kCorrupt,
-                   "index.blobs");
+  expect_refused(open_parts([](PackageParts& parts) { parts.blobs.pop_back(); }),
+                 StatusCode::kCorrupt, "motion.rotations: is missing");
+  expect_refused(open_parts([](PackageParts& parts) { parts.blobs.clear(); }), StatusCode::kCorrupt,
+                 "is missing");
+  expect_refused(open_parts([](PackageParts& parts) { parts.blobs.push_back(parts.blobs[0]); }),
+                 StatusCode::kCorrupt, "twice");
+  for (const std::string& name : {std::string(), std::string("Motion"), std::string("a b"),
+                                  std::string("x\ny"), std::string(65, 'a')}) {
+    expect_refused(
+        open_parts([&](PackageParts& parts) { parts.blobs.push_back(extra_blob(name, true)); }),
+        StatusCode::kCorrupt, "index.blobs");
   }
 }
 
@@ -282,11 +307,16 @@ TEST(PackageBlobs, RejectsShapesThatOverflowAreEmptyOrDoNotFit) {
   expect_refused(with_shape({1, 1, 3, 1, 1, 1, 1, 1, 1}), StatusCode::kCorrupt, "1 to 8 lengths");
   expect_refused(with_shape({3, 0}), StatusCode::kCorrupt, "length of zero");
   expect_refused(with_shape({4}), StatusCode::kCorrupt, "shape and type make 16 bytes");
-  expect_refused(with_shape({1u << 31, 1u << 31, 1}), StatusCode::kCorrupt, "overflows");        // 2^62 x 4 = 2^64: zero in 64 bits
-  expect_refused(with_shape({1u << 31, 1u << 31, 2}), StatusCode::kCorrupt, "overflows");        // 2^63 before the element size
-  expect_refused(with_shape({0x40000001u, 0x80000000u, 6}), StatusCode::kCorrupt, "overflows");  // wraps to a small number
-  expect_refused(with_shape({UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX}), StatusCode::kCorrupt, "overflows");
-  expect_refused(with_shape({1u << 30}), StatusCode::kCorrupt, "shape and type make 4294967296 bytes");
+  expect_refused(with_shape({1u << 31, 1u << 31, 1}), StatusCode::kCorrupt,
+                 "overflows");  // 2^62 x 4 = 2^64: zero in 64 bits
+  expect_refused(with_shape({1u << 31, 1u << 31, 2}), StatusCode::kCorrupt,
+                 "overflows");  // 2^63 before the element size
+  expect_refused(with_shape({0x40000001u, 0x80000000u, 6}), StatusCode::kCorrupt,
+                 "overflows");  // wraps to a small number
+  expect_refused(with_shape({UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX}), StatusCode::kCorrupt,
+                 "overflows");
+  expect_refused(with_shape({1u << 30}), StatusCode::kCorrupt,
+                 "shape and type make 4294967296 bytes");
 }
 
 TEST(PackageBlobs, RejectsOtherShapesAndTypesOfKnownBlobs) {
@@ -297,23 +327,31 @@ TEST(PackageBlobs, RejectsOtherShapesAndTypesOfKnownBlobs) {
     });
   };
   EXPECT_TRUE(with({3, 2, 4}, DataType::kF32).ok());
-  expect_refused(with({3, 8}, DataType::kF32), StatusCode::kCorrupt, "motion.rotations: has shape [3,8], expected [3,2,4]");
-  expect_refused(with({2, 3, 4}, DataType::kF32), StatusCode::kCorrupt, "motion.rotations: has shape");
-  expect_refused(with({3, 2, 4}, DataType::kU32), StatusCode::kCorrupt, "motion.rotations: is u32, not f32");
-  expect_refused(with({3, 2, 4}, static_cast<DataType>(7)), StatusCode::kUnsupported, "element type 7 is unknown");
+  expect_refused(with({3, 8}, DataType::kF32), StatusCode::kCorrupt,
+                 "motion.rotations: has shape [3,8], expected [3,2,4]");
+  expect_refused(with({2, 3, 4}, DataType::kF32), StatusCode::kCorrupt,
+                 "motion.rotations: has shape");
+  expect_refused(with({3, 2, 4}, DataType::kU32), StatusCode::kCorrupt,
+                 "motion.rotations: is u32, not f32");
+  expect_refused(with({3, 2, 4}, static_cast<DataType>(7)), StatusCode::kUnsupported,
+                 "element type 7 is unknown");
 }
 
 TEST(PackageLimits, RejectsIndicesThatCostTooMuch) {
   const auto with_settings = [](size_t count, size_t bytes) {
-    return open_parts([&](PackageParts& parts) { parts.provenance.settings.assign(count, {"key", std::string(bytes, 'x')}); });
+    return open_parts([&](PackageParts& parts) {
+      parts.provenance.settings.assign(count, {"key", std::string(bytes, 'x')});
+    });
   };
   EXPECT_TRUE(with_settings(1000, 4000).ok());
   expect_refused(with_settings(1025, 1), StatusCode::kLimitExceeded, "provenance.settings");
-  expect_refused(with_settings(1, 4097), StatusCode::kLimitExceeded, "provenance.settings[0].value");
+  expect_refused(with_settings(1, 4097), StatusCode::kLimitExceeded,
+                 "provenance.settings[0].value");
   expect_refused(with_settings(5000, 1), StatusCode::kCorrupt, "limits of depth and tables");
   expect_refused(with_settings(1024, 4096), StatusCode::kLimitExceeded, "header.index_bytes");
   expect_refused(open_parts([](PackageParts& parts) {
-                   for (int i = 0; i < 1100; ++i) parts.blobs.push_back(extra_blob("future." + std::to_string(i), true));
+                   for (int i = 0; i < 1100; ++i)
+                     parts.blobs.push_back(extra_blob("future." + std::to_string(i), true));
                  }),
                  StatusCode::kLimitExceeded, "index.blobs");
 }

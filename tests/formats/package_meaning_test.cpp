@@ -1,5 +1,5 @@
-// Behind the checksums: packages whose bytes are whole but whose numbers cannot be true. The writer opens what it wrote, so each refusal
-// here is the reader's.
+// Behind the checksums: packages whose bytes are whole but whose numbers cannot be true. The writer
+// opens what it wrote, so each refusal here is the reader's.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,9 +24,11 @@ using samples::Seal;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-void expect_refused(const Status& status, const std::string& words, StatusCode code = StatusCode::kCorrupt) {
+void expect_refused(const Status& status, const std::string& words,
+                    StatusCode code = StatusCode::kCorrupt) {
   EXPECT_STREQ(to_string(status.code()), to_string(code)) << status.message();
-  EXPECT_NE(status.message().find(words), std::string::npos) << status.message() << " should mention: " << words;
+  EXPECT_NE(status.message().find(words), std::string::npos)
+      << status.message() << " should mention: " << words;
   EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
 }
 
@@ -39,8 +41,12 @@ Status bent(const std::function<void(Sample&)>& bend) {
 }
 
 Status bent_body(const std::function<void(BodySample&)>& bend) { return bent<BodySample>(bend); }
-Status bent_avatar(const std::function<void(AvatarSample&)>& bend) { return bent<AvatarSample>(bend); }
-Status bent_motion(const std::function<void(MotionSample&)>& bend) { return bent<MotionSample>(bend); }
+Status bent_avatar(const std::function<void(AvatarSample&)>& bend) {
+  return bent<AvatarSample>(bend);
+}
+Status bent_motion(const std::function<void(MotionSample&)>& bend) {
+  return bent<MotionSample>(bend);
+}
 
 // ---- Body
 // ----------------------------------------------------------------------------------------------------------------------------------------
@@ -51,7 +57,8 @@ TEST(PackageBody, RejectsCyclicAndForwardParents) {
                    s.body.parents = s.parents;
                  }),
                  "joint 1: parent 2 is not an earlier joint");
-  expect_refused(bent_body([](BodySample& s) { s.parents[1] = 1; }), "joint 1: parent 1 is not an earlier joint");
+  expect_refused(bent_body([](BodySample& s) { s.parents[1] = 1; }),
+                 "joint 1: parent 1 is not an earlier joint");
   expect_refused(bent_body([](BodySample& s) { s.parents[2] = 3; }), "joint 2: parent 3");
   expect_refused(bent_body([](BodySample& s) { s.parents[2] = -1; }), "joint 2: parent -1");
   expect_refused(bent_body([](BodySample& s) { s.parents[2] = -32768; }), "joint 2");
@@ -61,62 +68,88 @@ TEST(PackageBody, RejectsCyclicAndForwardParents) {
 TEST(PackageBody, RejectsTexelsOutOfOrderOrOutsideTheMap) {
   expect_refused(bent_body([](BodySample& s) { s.texel[1] = s.texel[0]; }), "body.texel: texel 1");
   expect_refused(bent_body([](BodySample& s) { s.texel[0] = 60; }), "body.texel: texel 1");
-  expect_refused(bent_body([](BodySample& s) { s.texel[4] = 64; }), "texel 4: lies outside the map");
-  expect_refused(bent_body([](BodySample& s) { s.texel[4] = UINT32_MAX; }), "texel 4: lies outside the map");
-  expect_refused(bent_body([](BodySample& s) { s.body.uv_size = 2; }), "covers more texels than the map has");
+  expect_refused(bent_body([](BodySample& s) { s.texel[4] = 64; }),
+                 "texel 4: lies outside the map");
+  expect_refused(bent_body([](BodySample& s) { s.texel[4] = UINT32_MAX; }),
+                 "texel 4: lies outside the map");
+  expect_refused(bent_body([](BodySample& s) { s.body.uv_size = 2; }),
+                 "covers more texels than the map has");
   expect_refused(bent_body([](BodySample& s) { s.body.uv_size = 0; }), "body.uv_size");
-  expect_refused(bent_body([](BodySample& s) { s.body.uv_size = kMaxUvSize + 1; }), "body.uv_size", StatusCode::kLimitExceeded);
+  expect_refused(bent_body([](BodySample& s) { s.body.uv_size = kMaxUvSize + 1; }), "body.uv_size",
+                 StatusCode::kLimitExceeded);
   // A side whose square is a multiple of 2^32.
-  expect_refused(bent_body([](BodySample& s) { s.body.uv_size = 1u << 16; }), "body.uv_size", StatusCode::kLimitExceeded);
+  expect_refused(bent_body([](BodySample& s) { s.body.uv_size = 1u << 16; }), "body.uv_size",
+                 StatusCode::kLimitExceeded);
 }
 
 TEST(PackageBody, RejectsWeightsThatAreNone) {
-  expect_refused(bent_body([](BodySample& s) { s.texel_weights[9] = kNan; }), "texel 1: a weight is negative or not a number");
-  expect_refused(bent_body([](BodySample& s) { s.texel_weights[9] = -0.25f; }), "texel 1: a weight is negative");
-  expect_refused(bent_body([](BodySample& s) { s.texel_weights[9] = kInfinity; }), "the weights sum to inf");
-  expect_refused(bent_body([](BodySample& s) { s.texel_weights[9] += 2e-4f; }), "texel 1: the weights sum to 1.0002");
+  expect_refused(bent_body([](BodySample& s) { s.texel_weights[9] = kNan; }),
+                 "texel 1: a weight is negative or not a number");
+  expect_refused(bent_body([](BodySample& s) { s.texel_weights[9] = -0.25f; }),
+                 "texel 1: a weight is negative");
+  expect_refused(bent_body([](BodySample& s) { s.texel_weights[9] = kInfinity; }),
+                 "the weights sum to inf");
+  expect_refused(bent_body([](BodySample& s) { s.texel_weights[9] += 2e-4f; }),
+                 "texel 1: the weights sum to 1.0002");
   EXPECT_TRUE(bent_body([](BodySample& s) { s.texel_weights[9] += 5e-5f; }).ok());
 }
 
 TEST(PackageBody, RejectsIndicesOutOfRange) {
   expect_refused(bent_body([](BodySample& s) { s.texel_joints[15] = 3; }), "texel 1: joint 3 of 3");
-  expect_refused(bent_body([](BodySample& s) { s.border_texel[0] = 64; }), "body.border_texel: entry 0: lies outside the map");
-  expect_refused(bent_body([](BodySample& s) { s.border_texel[0] = 9; }), "entry 0: is covered or there twice");
-  expect_refused(bent_body([](BodySample& s) { s.border_texel[1] = 1; }), "entry 1: is covered or there twice");
-  expect_refused(bent_body([](BodySample& s) { s.border_source[2] = 5; }), "body.border_source: entry 2");
+  expect_refused(bent_body([](BodySample& s) { s.border_texel[0] = 64; }),
+                 "body.border_texel: entry 0: lies outside the map");
+  expect_refused(bent_body([](BodySample& s) { s.border_texel[0] = 9; }),
+                 "entry 0: is covered or there twice");
+  expect_refused(bent_body([](BodySample& s) { s.border_texel[1] = 1; }),
+                 "entry 1: is covered or there twice");
+  expect_refused(bent_body([](BodySample& s) { s.border_source[2] = 5; }),
+                 "body.border_source: entry 2");
 }
 
 TEST(PackageBody, RejectsLengthsThatAreNotPositiveAndFinite) {
   for (float value : {0.0f, -1.0f, kNan, kInfinity}) {
-    expect_refused(bent_body([&](BodySample& s) { s.texel_spacing[2] = value; }), "body.texel_spacing: texel 2");
+    expect_refused(bent_body([&](BodySample& s) { s.texel_spacing[2] = value; }),
+                   "body.texel_spacing: texel 2");
   }
   for (float value : {kNan, kInfinity, -1e30f, 1001.0f}) {
-    expect_refused(bent_body([&](BodySample& s) { s.joint_position[8] = value; }), "body.joint_position: value 8");
-    expect_refused(bent_body([&](BodySample& s) { s.joint_shape_basis[17] = value; }), "body.joint_shape_basis: value 17");
-    expect_refused(bent_body([&](BodySample& s) { s.texel_position[0] = value; }), "body.texel_position: value 0");
-    expect_refused(bent_body([&](BodySample& s) { s.texel_shape_basis[29] = value; }), "body.texel_shape_basis: value 29");
+    expect_refused(bent_body([&](BodySample& s) { s.joint_position[8] = value; }),
+                   "body.joint_position: value 8");
+    expect_refused(bent_body([&](BodySample& s) { s.joint_shape_basis[17] = value; }),
+                   "body.joint_shape_basis: value 17");
+    expect_refused(bent_body([&](BodySample& s) { s.texel_position[0] = value; }),
+                   "body.texel_position: value 0");
+    expect_refused(bent_body([&](BodySample& s) { s.texel_shape_basis[29] = value; }),
+                   "body.texel_shape_basis: value 29");
   }
   for (float value : {kNan, 2.0f, 0.5f}) {
-    expect_refused(bent_body([&](BodySample& s) { s.texel_normal[0] = value; }), "body.texel_normal: texel 0");
+    expect_refused(bent_body([&](BodySample& s) { s.texel_normal[0] = value; }),
+                   "body.texel_normal: texel 0");
   }
 }
 
 TEST(PackageBody, RejectsJointNamesThatAreNone) {
-  expect_refused(bent_body([](BodySample& s) { s.body.joint_names[2] = "pelvis"; }), "body.joint_names[2]: 'pelvis' is there twice");
-  expect_refused(bent_body([](BodySample& s) { s.body.joint_names[2] = ""; }), "body.joint_names[2]: is empty");
-  expect_refused(bent_body([](BodySample& s) { s.body.joint_names[1] = "\xC3"; }), "body.joint_names[1]: is not UTF-8");
+  expect_refused(bent_body([](BodySample& s) { s.body.joint_names[2] = "pelvis"; }),
+                 "body.joint_names[2]: 'pelvis' is there twice");
+  expect_refused(bent_body([](BodySample& s) { s.body.joint_names[2] = ""; }),
+                 "body.joint_names[2]: is empty");
+  expect_refused(bent_body([](BodySample& s) { s.body.joint_names[1] = "\xC3"; }),
+                 "body.joint_names[1]: is not UTF-8");
   expect_refused(bent_body([](BodySample& s) { s.body.joint_names[1] = "a\x1B[2J"; }),
                  "body.joint_names[1]: is not UTF-8 text without control");
-  expect_refused(bent_body([](BodySample& s) { s.body.joint_names[1] = std::string(257, 'a'); }), "body.joint_names[1]",
-                 StatusCode::kLimitExceeded);
+  expect_refused(bent_body([](BodySample& s) { s.body.joint_names[1] = std::string(257, 'a'); }),
+                 "body.joint_names[1]", StatusCode::kLimitExceeded);
   expect_refused(bent_body([](BodySample& s) { s.body.name = "two\nlines"; }), "body.name");
 }
 
 TEST(PackageBody, RejectsAWrongNumberOfShapeCoefficients) {
-  expect_refused(bent_body([](BodySample& s) { s.body.texel_shape_basis_m = s.body.texel_shape_basis_m.first(15); }),
+  expect_refused(bent_body([](BodySample& s) {
+                   s.body.texel_shape_basis_m = s.body.texel_shape_basis_m.first(15);
+                 }),
                  "body.texel_shape_basis");
-  expect_refused(bent_body([](BodySample& s) { s.body.texel_shape_basis_m = {}; }), "body.texel_shape_basis");
-  expect_refused(bent_body([](BodySample& s) { s.body.joint_shape_basis_m = {}; }), "body.texel_shape_basis");
+  expect_refused(bent_body([](BodySample& s) { s.body.texel_shape_basis_m = {}; }),
+                 "body.texel_shape_basis");
+  expect_refused(bent_body([](BodySample& s) { s.body.joint_shape_basis_m = {}; }),
+                 "body.texel_shape_basis");
   expect_refused(bent_body([](BodySample& s) {
                    s.joint_shape_basis.assign(65 * 9, 0);
                    s.body.joint_shape_basis_m = s.joint_shape_basis;
@@ -129,30 +162,38 @@ TEST(PackageBody, RejectsAWrongNumberOfShapeCoefficients) {
 
 TEST(PackageAvatar, RejectsWeightsThatAreNotFinite) {
   for (float value : {kNan, kInfinity, -kInfinity}) {
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.weights[0][5] = value; }), "network.0.weights: value 5 is not finite");
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.biases.back()[22] = value; }), ".bias: value 22 is not finite");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.weights[0][5] = value; }),
+                   "network.0.weights: value 5 is not finite");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.biases.back()[22] = value; }),
+                   ".bias: value 22 is not finite");
   }
 }
 
 TEST(PackageAvatar, RejectsNetworksThatDoNotFitTheHeadOrTheMaps) {
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.decoding.sh_degree = 0; }), "the head needs 14");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.decoding.sh_degree = 4; }), "avatar.decoding.sh_degree");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.fourier_octaves = 2; }), "maps and Fourier channels make 14");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.fourier_octaves = 0xFFFFFFFFu; }), "avatar.fourier_octaves",
-                 StatusCode::kLimitExceeded);
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.decoding.sh_degree = 0; }),
+                 "the head needs 14");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.decoding.sh_degree = 4; }),
+                 "avatar.decoding.sh_degree");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.fourier_octaves = 2; }),
+                 "maps and Fourier channels make 14");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.fourier_octaves = 0xFFFFFFFFu; }),
+                 "avatar.fourier_octaves", StatusCode::kLimitExceeded);
   expect_refused(bent_avatar([](AvatarSample& s) {
                    s.avatar.network.input_size = 2048;
                    s.budget = {};
                  }),
                  "network.input_size", StatusCode::kLimitExceeded);
-  expect_refused(bent_avatar([](AvatarSample& s) {
-                   s.avatar.network.layers.push_back({.op = LayerOp::kMaxPool2, .inputs = {uint32_t(s.avatar.network.layers.size()), 0}});
-                 }),
-                 "does not have the size of the input");
+  expect_refused(
+      bent_avatar([](AvatarSample& s) {
+        s.avatar.network.layers.push_back(
+            {.op = LayerOp::kMaxPool2, .inputs = {uint32_t(s.avatar.network.layers.size()), 0}});
+      }),
+      "does not have the size of the input");
 }
 
 TEST(PackageAvatar, RejectsLayersBehindTheWritersBack) {
-  // The writer refuses these itself; the reader must too: bend the description after it was taken apart.
+  // The writer refuses these itself; the reader must too: bend the description after it was taken
+  // apart.
   const auto with = [](const std::function<void(Network&)>& bend) {
     AvatarSample sample;
     PackageParts parts = *take_apart(sample.avatar, sample.budget, {});
@@ -160,15 +201,22 @@ TEST(PackageAvatar, RejectsLayersBehindTheWritersBack) {
     const ExactBytes bytes(assemble(parts));
     return Package::open(bytes.bytes(), "bent.fgn").status();
   };
-  expect_refused(with([](Network& n) { n.layers[3].inputs[0] = 4; }), "network: layer 3: input is not an earlier value");
-  expect_refused(with([](Network& n) { n.layers[3].inputs[0] = UINT32_MAX; }), "network: layer 3: input is not an earlier value");
+  expect_refused(with([](Network& n) { n.layers[3].inputs[0] = 4; }),
+                 "network: layer 3: input is not an earlier value");
+  expect_refused(with([](Network& n) { n.layers[3].inputs[0] = UINT32_MAX; }),
+                 "network: layer 3: input is not an earlier value");
   expect_refused(with([](Network& n) { n.layers[0].kernel = 2; }), "network: layer 0: kernel");
-  expect_refused(with([](Network& n) { n.layers[0].kernel = 1; }), "network.0.weights: has shape [2,3,3,10], expected [2,1,1,10]");
-  expect_refused(with([](Network& n) { n.layers[0].out_channels = UINT32_MAX; }), "network: layer 0: output channels");
-  expect_refused(with([](Network& n) { n.layers[0].out_channels = 3; }), "network.0.weights: has shape");
-  expect_refused(with([](Network& n) { n.layers[0].op = static_cast<LayerOp>(9); }), "network: layer 0: unknown operator");
+  expect_refused(with([](Network& n) { n.layers[0].kernel = 1; }),
+                 "network.0.weights: has shape [2,3,3,10], expected [2,1,1,10]");
+  expect_refused(with([](Network& n) { n.layers[0].out_channels = UINT32_MAX; }),
+                 "network: layer 0: output channels");
+  expect_refused(with([](Network& n) { n.layers[0].out_channels = 3; }),
+                 "network.0.weights: has shape");
+  expect_refused(with([](Network& n) { n.layers[0].op = static_cast<LayerOp>(9); }),
+                 "network: layer 0: unknown operator");
   expect_refused(with([](Network& n) { n.layers.clear(); }), "network: number of layers");
-  expect_refused(with([](Network& n) { n.layers.resize(kMaxLayers + 1); }), "network: more than 256 layers", StatusCode::kLimitExceeded);
+  expect_refused(with([](Network& n) { n.layers.resize(kMaxLayers + 1); }),
+                 "network: more than 256 layers", StatusCode::kLimitExceeded);
   expect_refused(with([](Network& n) { n.input_size = 9; }), "pools an odd size");
   expect_refused(with([](Network& n) { n.input_channels = 0; }), "network: input size or channels");
 }
@@ -176,22 +224,37 @@ TEST(PackageAvatar, RejectsLayersBehindTheWritersBack) {
 TEST(PackageAvatar, RejectsFixedPointWhoseArithmeticIsNotDefined) {
   using Bend = std::function<void(FixedPointAvatarSample&)>;
   const auto bent = [](const Bend& bend) { return ::figurine::bent<FixedPointAvatarSample>(bend); };
-  for (const float scale : {0.0f, -0.125f, kNan, kInfinity, std::numeric_limits<float>::denorm_min()}) {
-    expect_refused(bent([&](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[1].scale = scale; }),
-                   "fixed point: value 1: the scale");
+  for (const float scale :
+       {0.0f, -0.125f, kNan, kInfinity, std::numeric_limits<float>::denorm_min()}) {
+    expect_refused(
+        bent([&](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[1].scale = scale; }),
+        "fixed point: value 1: the scale");
     expect_refused(bent([&](FixedPointAvatarSample& s) { s.fixed_scales[0][1] = scale; }),
                    "fixed point: layer 0: output 1: the weights' scale");
   }
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[1].zero_point = -129; }), "value 1: the zero point");
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[0].zero_point = 1; }), "value 0: the zero point");
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.fixed_weights[0][7] = -128; }), "layer 0: output 0: a weight is -128");
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.fixed_biases[0][1] = INT32_MAX; }), "layer 0: output 1: a sum can overflow int32");
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[3].scale = 0.25f; }), "do not share one quantisation");
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values.pop_back(); }), "fixed point: not one entry per layer");
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.network.layers.back().relu = true; }), "without ReLU");
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values.resize(300); }), "more than 256 values",
-                 StatusCode::kLimitExceeded);
-  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.golden.fixed_point_library = "two\nlines"; }), "golden.fixed_point_library");
+  expect_refused(
+      bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[1].zero_point = -129; }),
+      "value 1: the zero point");
+  expect_refused(
+      bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[0].zero_point = 1; }),
+      "value 0: the zero point");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.fixed_weights[0][7] = -128; }),
+                 "layer 0: output 0: a weight is -128");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.fixed_biases[0][1] = INT32_MAX; }),
+                 "layer 0: output 1: a sum can overflow int32");
+  expect_refused(
+      bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values[3].scale = 0.25f; }),
+      "do not share one quantisation");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values.pop_back(); }),
+                 "fixed point: not one entry per layer");
+  expect_refused(
+      bent([](FixedPointAvatarSample& s) { s.avatar.network.layers.back().relu = true; }),
+      "without ReLU");
+  expect_refused(bent([](FixedPointAvatarSample& s) { s.avatar.fixed_point.values.resize(300); }),
+                 "more than 256 values", StatusCode::kLimitExceeded);
+  expect_refused(
+      bent([](FixedPointAvatarSample& s) { s.avatar.golden.fixed_point_library = "two\nlines"; }),
+      "golden.fixed_point_library");
 }
 
 TEST(PackageAvatar, RejectsNetworksThatAreThereInPart) {
@@ -199,13 +262,18 @@ TEST(PackageAvatar, RejectsNetworksThatAreThereInPart) {
     FixedPointAvatarSample sample;
     if (with_floats) sample.with_floats();
     PackageParts parts = *take_apart(sample.avatar, sample.budget, {});
-    EXPECT_EQ(std::erase_if(parts.blobs, [&](const BlobPart& blob) { return blob.name == name; }), 1u) << name;
+    EXPECT_EQ(std::erase_if(parts.blobs, [&](const BlobPart& blob) { return blob.name == name; }),
+              1u)
+        << name;
     const ExactBytes bytes(assemble(parts));
     return Package::open(bytes.bytes(), "bent.fgn").status();
   };
-  expect_refused(without("network.0.weights", true), "network.0.weights: is missing, while others are there");
-  expect_refused(without("network.23.weights", true), "network.23.weights: is missing, while others are there");
-  expect_refused(without("network.4.bias", true), "network.4.bias: is missing, while others are there");
+  expect_refused(without("network.0.weights", true),
+                 "network.0.weights: is missing, while others are there");
+  expect_refused(without("network.23.weights", true),
+                 "network.23.weights: is missing, while others are there");
+  expect_refused(without("network.4.bias", true),
+                 "network.4.bias: is missing, while others are there");
   for (const char* name : {"fixed.0.weights", "fixed.0.scale", "fixed.23.bias"}) {
     expect_refused(without(name, false), std::string(name) + ": is missing");
   }
@@ -220,11 +288,14 @@ TEST(PackageAvatar, TheHeaderAndTheGoldenHashAgreeWithTheNetwork) {
   };
   AvatarSample floats, hashed;
   FixedPointAvatarSample fixed;
-  expect_refused(with(floats, [](PackageParts& parts, Avatar&) { parts.required_features = kFeatureFixedPoint; }),
+  expect_refused(with(floats, [](PackageParts& parts,
+                                 Avatar&) { parts.required_features = kFeatureFixedPoint; }),
                  "the bit of fixed point is set, such a network is not there");
   expect_refused(with(fixed, [](PackageParts& parts, Avatar&) { parts.required_features = 0; }),
                  "the bit of fixed point is not set, such a network is there");
-  expect_refused(with(hashed, [](PackageParts&, Avatar& avatar) { avatar.golden.fixed_point_hash[1] = 1; }), "golden.fixed_point_hash");
+  expect_refused(
+      with(hashed, [](PackageParts&, Avatar& avatar) { avatar.golden.fixed_point_hash[1] = 1; }),
+      "golden.fixed_point_hash");
 }
 
 TEST(PackageAvatar, RejectsFixedPointBehindTheWritersBack) {
@@ -237,39 +308,51 @@ TEST(PackageAvatar, RejectsFixedPointBehindTheWritersBack) {
     const ExactBytes bytes(assemble(parts));
     return Package::open(bytes.bytes(), "bent.fgn").status();
   };
-  expect_refused(with("fixed.0.weights", [](BlobPart& blob) { blob.type = DataType::kU8; }), "fixed.0.weights: is u8, not i8");
-  expect_refused(with("fixed.0.bias", [](BlobPart& blob) { blob.type = DataType::kU32; }), "fixed.0.bias: is u32, not i32");
+  expect_refused(with("fixed.0.weights", [](BlobPart& blob) { blob.type = DataType::kU8; }),
+                 "fixed.0.weights: is u8, not i8");
+  expect_refused(with("fixed.0.bias", [](BlobPart& blob) { blob.type = DataType::kU32; }),
+                 "fixed.0.bias: is u32, not i32");
   expect_refused(with("fixed.0.weights", [](BlobPart& blob) { blob.shape = {180}; }),
                  "fixed.0.weights: has shape [180], expected [2,3,3,10]");
-  expect_refused(with("fixed.0.scale", [](BlobPart& blob) { blob.bytes = blob.bytes.first(4), blob.shape = {1}; }),
+  expect_refused(with("fixed.0.scale",
+                      [](BlobPart& blob) { blob.bytes = blob.bytes.first(4), blob.shape = {1}; }),
                  "fixed.0.scale: has shape [1], expected [2]");
 }
 
 TEST(PackageAvatar, RejectsDecodingsThatCannotBe) {
   for (float value : {0.0f, -1.0f, kNan, kInfinity, 1e30f}) {
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.offset_scale_m = value; }), "avatar.decoding.offset_scale_m");
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.spacing_scale = value; }), "avatar.decoding.spacing_scale");
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.max_log_scale = value; }), "avatar.decoding.max_log_scale");
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.map_statistics.scale[5] = value; }), "avatar.map_statistics: channel 5");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.offset_scale_m = value; }),
+                   "avatar.decoding.offset_scale_m");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.spacing_scale = value; }),
+                   "avatar.decoding.spacing_scale");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.max_log_scale = value; }),
+                   "avatar.decoding.max_log_scale");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.map_statistics.scale[5] = value; }),
+                   "avatar.map_statistics: channel 5");
   }
   for (float value : {kNan, kInfinity, -1e30f}) {
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.opacity_bias = value; }), "avatar.decoding.opacity_bias");
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.map_statistics.mean[0] = value; }), "avatar.map_statistics: channel 0");
-    expect_refused(bent_avatar([&](AvatarSample& s) { s.shape[1] = value; }), "avatar.shape: value 1");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.opacity_bias = value; }),
+                   "avatar.decoding.opacity_bias");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.map_statistics.mean[0] = value; }),
+                   "avatar.map_statistics: channel 0");
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.shape[1] = value; }),
+                   "avatar.shape: value 1");
   }
   expect_refused(bent_avatar([](AvatarSample& s) {
                    s.shape.assign(65, 0);
                    s.avatar.shape = s.shape;
                  }),
                  "avatar.shape", StatusCode::kLimitExceeded);
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.template_mode = static_cast<TemplateMode>(2); }), "avatar.template_mode",
-                 StatusCode::kUnsupported);
+  expect_refused(
+      bent_avatar([](AvatarSample& s) { s.avatar.template_mode = static_cast<TemplateMode>(2); }),
+      "avatar.template_mode", StatusCode::kUnsupported);
 }
 
 TEST(PackageAvatar, RejectsBudgetsThatTheNetworkBreaks) {
-  expect_refused(bent_avatar([](AvatarSample& s) { s.budget.macs_per_frame -= 1; }), "budget.macs_per_frame", StatusCode::kLimitExceeded);
-  expect_refused(bent_avatar([](AvatarSample& s) { s.budget.peak_memory_bytes = 100; }), "budget.peak_memory_bytes",
-                 StatusCode::kLimitExceeded);
+  expect_refused(bent_avatar([](AvatarSample& s) { s.budget.macs_per_frame -= 1; }),
+                 "budget.macs_per_frame", StatusCode::kLimitExceeded);
+  expect_refused(bent_avatar([](AvatarSample& s) { s.budget.peak_memory_bytes = 100; }),
+                 "budget.peak_memory_bytes", StatusCode::kLimitExceeded);
   expect_refused(bent_avatar([](AvatarSample& s) { s.budget.gaussians = 65; }), "budget.gaussians");
   EXPECT_TRUE(bent_avatar([](AvatarSample& s) { s.budget = {}; }).ok());
 }
@@ -277,13 +360,16 @@ TEST(PackageAvatar, RejectsBudgetsThatTheNetworkBreaks) {
 TEST(PackageAvatar, RejectsNetworksTooLargeForAnyDevice) {
   // 1024 x 1024 x 512 floats: 2 GiB for one activation, from weights of 30 kB.
   const Status status = bent_avatar([](AvatarSample& s) {
-    s.avatar.network = {.input_size = 1024, .input_channels = 10, .layers = {{.op = LayerOp::kConv2d, .out_channels = 512, .kernel = 1}}};
+    s.avatar.network = {.input_size = 1024,
+                        .input_channels = 10,
+                        .layers = {{.op = LayerOp::kConv2d, .out_channels = 512, .kernel = 1}}};
     s.weights.assign(1, std::vector<float>(5120));
     s.biases.assign(1, std::vector<float>(512));
     s.avatar.network.layers[0].weights = s.weights[0];
     s.avatar.network.layers[0].bias = s.biases[0];
     const uint32_t head = head_channels(1);
-    s.avatar.network.layers.push_back({.op = LayerOp::kConv2d, .inputs = {1, 0}, .out_channels = head, .kernel = 1});
+    s.avatar.network.layers.push_back(
+        {.op = LayerOp::kConv2d, .inputs = {1, 0}, .out_channels = head, .kernel = 1});
     s.weights.emplace_back(512 * head);
     s.biases.emplace_back(head);
     s.avatar.network.layers[1].weights = s.weights[1];
@@ -298,13 +384,18 @@ TEST(PackageAvatar, RejectsNetworksTooLargeForAnyDevice) {
 TEST(PackageAvatar, RejectsPoseStatisticsThatCannotBeInverted) {
   expect_refused(bent_avatar([](AvatarSample& s) { s.pose_covariance[1] = 0.25f; }),
                  "pose.covariance: is not symmetric in row 1, column 0");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.pose_covariance[8] = 0; }), "pose.covariance: row 2: the variance is not positive");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.pose_covariance[1] = s.pose_covariance[3] = 0.5f; }),
-                 "pose.covariance: is not positive definite");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.pose_covariance[1] = s.pose_covariance[3] = kNan; }),
-                 "pose.covariance: value 1 is not finite");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.pose_mean[2] = kInfinity; }), "pose.mean: value 2 is not finite");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.pose_statistics.joints = {1, 1}; }), "pose.mean", StatusCode::kInvalidArgument);
+  expect_refused(bent_avatar([](AvatarSample& s) { s.pose_covariance[8] = 0; }),
+                 "pose.covariance: row 2: the variance is not positive");
+  expect_refused(
+      bent_avatar([](AvatarSample& s) { s.pose_covariance[1] = s.pose_covariance[3] = 0.5f; }),
+      "pose.covariance: is not positive definite");
+  expect_refused(
+      bent_avatar([](AvatarSample& s) { s.pose_covariance[1] = s.pose_covariance[3] = kNan; }),
+      "pose.covariance: value 1 is not finite");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.pose_mean[2] = kInfinity; }),
+                 "pose.mean: value 2 is not finite");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.pose_statistics.joints = {1, 1}; }),
+                 "pose.mean", StatusCode::kInvalidArgument);
   expect_refused(bent_avatar([](AvatarSample& s) {
                    s.avatar.pose_statistics.joints = {1, 1};
                    s.pose_mean.assign(6, 0);
@@ -316,17 +407,28 @@ TEST(PackageAvatar, RejectsPoseStatisticsThatCannotBeInverted) {
 }
 
 TEST(PackageAvatar, RejectsGoldenFramesThatCannotBeDrawn) {
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.fx_px = 0; }), "golden: camera: focal lengths");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.view_from_world[0] = 2; }), "golden: camera");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.near_m = kNan; }), "golden: camera: the near distance");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.width_px = 0; }), "golden: camera: image size");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.golden_rotations[0] = 0; }), "golden: pose: the rotation of joint 0 is zero");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.golden_rotations[4] = kNan; }), "golden: pose: the rotation of joint 1");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.root_translation_m[1] = kNan; }), "golden: pose: the root translation");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.background[1] = 1.5f; }), "golden.background");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.golden_png[1] = 'J'; }), "golden.png: is not a PNG file");
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.png = s.avatar.golden.png.first(20); }),
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.fx_px = 0; }),
+                 "golden: camera: focal lengths");
+  expect_refused(
+      bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.view_from_world[0] = 2; }),
+      "golden: camera");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.near_m = kNan; }),
+                 "golden: camera: the near distance");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.width_px = 0; }),
+                 "golden: camera: image size");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.golden_rotations[0] = 0; }),
+                 "golden: pose: the rotation of joint 0 is zero");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.golden_rotations[4] = kNan; }),
+                 "golden: pose: the rotation of joint 1");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.root_translation_m[1] = kNan; }),
+                 "golden: pose: the root translation");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.background[1] = 1.5f; }),
+                 "golden.background");
+  expect_refused(bent_avatar([](AvatarSample& s) { s.golden_png[1] = 'J'; }),
                  "golden.png: is not a PNG file");
+  expect_refused(
+      bent_avatar([](AvatarSample& s) { s.avatar.golden.png = s.avatar.golden.png.first(20); }),
+      "golden.png: is not a PNG file");
   expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.camera.width_px = 17; }),
                  "golden.png: does not have the golden camera's size");
 }
@@ -340,9 +442,11 @@ TEST(PackageMotion, RejectsPosesThatAreNone) {
                    "motion.rotations: frame 2, joint 0: not a unit quaternion");
   }
   EXPECT_TRUE(bent_motion([](MotionSample& s) { s.rotations[16] = 1.0005f; }).ok());
-  expect_refused(bent_motion([](MotionSample& s) { s.root_translation[4] = kNan; }), "motion.root_translation: value 4 is not finite");
+  expect_refused(bent_motion([](MotionSample& s) { s.root_translation[4] = kNan; }),
+                 "motion.root_translation: value 4 is not finite");
   for (float value : {0.0f, -30.0f, kNan, kInfinity}) {
-    expect_refused(bent_motion([&](MotionSample& s) { s.motion.frames_per_second = value; }), "motion.frames_per_second");
+    expect_refused(bent_motion([&](MotionSample& s) { s.motion.frames_per_second = value; }),
+                   "motion.frames_per_second");
   }
   expect_refused(bent_motion([](MotionSample& s) {
                    s.motion.frame_count = 0;
@@ -362,18 +466,30 @@ TEST(PackageProvenance, RejectsFiguresThatAreNotFiniteAndTextThatIsNone) {
     return write_package(sample.motion, provenance).status();
   };
   EXPECT_TRUE(with([](Provenance& p) { p = {}; }).ok());
-  expect_refused(with([](Provenance& p) { p.quality[1].value = std::numeric_limits<double>::quiet_NaN(); }),
-                 "provenance.quality[1]: is not finite");
+  expect_refused(
+      with([](Provenance& p) { p.quality[1].value = std::numeric_limits<double>::quiet_NaN(); }),
+      "provenance.quality[1]: is not finite");
   expect_refused(with([](Provenance& p) { p.tool = "\xFF"; }), "provenance.tool");
-  expect_refused(with([](Provenance& p) { p.settings[0].key = "a\nb"; }), "provenance.settings[0].key");
-  expect_refused(with([](Provenance& p) { p.sources[1] = std::string("a\0b", 3); }), "provenance.sources[1]");
-  expect_refused(with([](Provenance& p) { p.licence_url = std::string(4097, 'x'); }), "provenance.licence_url", StatusCode::kLimitExceeded);
-  expect_refused(with([](Provenance& p) { p.authors.assign(1025, "x"); }), "provenance.authors", StatusCode::kLimitExceeded);
+  expect_refused(with([](Provenance& p) { p.settings[0].key = "a\nb"; }),
+                 "provenance.settings[0].key");
+  expect_refused(with([](Provenance& p) { p.sources[1] = std::string("a\0b", 3); }),
+                 "provenance.sources[1]");
+  expect_refused(with([](Provenance& p) { p.licence_url = std::string(4097, 'x'); }),
+                 "provenance.licence_url", StatusCode::kLimitExceeded);
+  expect_refused(with([](Provenance& p) { p.authors.assign(1025, "x"); }), "provenance.authors",
+                 StatusCode::kLimitExceeded);
 }
 
 TEST(PackageText, FollowsTheUtf8TableAndKeepsControlCharactersOut) {
-  const char* const sound[] = {
-      "", "plain", "\xC2\xA0", "\xDF\xBF", "\xE0\xA0\x80", "\xED\x9F\xBF", "\xEE\x80\x80", "\xF0\x90\x80\x80", "\xF4\x8F\xBF\xBF"};
+  const char* const sound[] = {"",
+                               "plain",
+                               "\xC2\xA0",
+                               "\xDF\xBF",
+                               "\xE0\xA0\x80",
+                               "\xED\x9F\xBF",
+                               "\xEE\x80\x80",
+                               "\xF0\x90\x80\x80",
+                               "\xF4\x8F\xBF\xBF"};
   for (const char* text : sound) EXPECT_TRUE(is_clean_text(text, false)) << text;
   const char* const unsound[] = {"\x80",              // continuation alone
                                  "\xC0\x80",          // overlong NUL
@@ -397,15 +513,18 @@ TEST(PackageText, FollowsTheUtf8TableAndKeepsControlCharactersOut) {
 TEST(PackageIndex, RejectsUnknownConventions) {
   const Result<std::vector<std::byte>> written = MotionSample().write();
   const Seal seal(*written);
-  // The five conventions are five neighbouring zero bytes of the index: bend every byte in turn and look for them.
+  // The five conventions are five neighbouring zero bytes of the index: bend every byte in turn and
+  // look for them.
   size_t run = 0, longest = 0;
-  for (size_t at = kPackageHeaderBytes; at < kPackageHeaderBytes + samples::get_header(*written).index_bytes; ++at) {
+  for (size_t at = kPackageHeaderBytes;
+       at < kPackageHeaderBytes + samples::get_header(*written).index_bytes; ++at) {
     ExactBytes bytes(*written);
     const bool was_zero = bytes.bytes()[at] == std::byte{0};
     bytes.bytes()[at] = std::byte{1};
     seal.renew(bytes.bytes());
     const Status status = Package::open(bytes.bytes(), "bent.fgn").status();
-    const bool refused = status.code() == StatusCode::kUnsupported && status.message().rfind("bent.fgn: index.conventions: ", 0) == 0;
+    const bool refused = status.code() == StatusCode::kUnsupported &&
+                         status.message().rfind("bent.fgn: index.conventions: ", 0) == 0;
     run = was_zero && refused ? run + 1 : 0;
     longest = std::max(longest, run);
   }
@@ -417,18 +536,31 @@ TEST(PackageIndex, RejectsUnknownConventions) {
 
 TEST(PackageWriter, RejectsArraysWhoseLengthFitsNoShape) {
   constexpr StatusCode kInvalid = StatusCode::kInvalidArgument;
-  expect_refused(bent_body([](BodySample& s) { s.body.texel_position_m = s.body.texel_position_m.first(14); }), "body.texel_position",
+  expect_refused(
+      bent_body([](BodySample& s) { s.body.texel_position_m = s.body.texel_position_m.first(14); }),
+      "body.texel_position", kInvalid);
+  expect_refused(
+      bent_body([](BodySample& s) { s.body.texel_normal = s.body.texel_normal.first(12); }),
+      "body.texel_normal", kInvalid);
+  expect_refused(bent_body([](BodySample& s) { s.body.joint_names.pop_back(); }), "body.parents",
                  kInvalid);
-  expect_refused(bent_body([](BodySample& s) { s.body.texel_normal = s.body.texel_normal.first(12); }), "body.texel_normal", kInvalid);
-  expect_refused(bent_body([](BodySample& s) { s.body.joint_names.pop_back(); }), "body.parents", kInvalid);
-  expect_refused(bent_body([](BodySample& s) { s.body.border_source = s.body.border_source.first(2); }), "body.border_source", kInvalid);
-  expect_refused(bent_body([](BodySample& s) { s.body.texel_weights = {}; }), "body.texel_weights", kInvalid);
-  expect_refused(bent_motion([](MotionSample& s) { s.motion.frame_count = 2; }), "motion.root_translation", kInvalid);
-  expect_refused(bent_motion([](MotionSample& s) { s.motion.joint_names.pop_back(); }), "motion.rotations", kInvalid);
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.network.layers[0].bias = {}; }), "network: layer 0", kInvalid);
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.rotations = s.avatar.golden.rotations.first(11); }), "golden.rotations",
+  expect_refused(
+      bent_body([](BodySample& s) { s.body.border_source = s.body.border_source.first(2); }),
+      "body.border_source", kInvalid);
+  expect_refused(bent_body([](BodySample& s) { s.body.texel_weights = {}; }), "body.texel_weights",
                  kInvalid);
-  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.rotations = {}; }), "golden.png", kInvalid);
+  expect_refused(bent_motion([](MotionSample& s) { s.motion.frame_count = 2; }),
+                 "motion.root_translation", kInvalid);
+  expect_refused(bent_motion([](MotionSample& s) { s.motion.joint_names.pop_back(); }),
+                 "motion.rotations", kInvalid);
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.network.layers[0].bias = {}; }),
+                 "network: layer 0", kInvalid);
+  expect_refused(bent_avatar([](AvatarSample& s) {
+                   s.avatar.golden.rotations = s.avatar.golden.rotations.first(11);
+                 }),
+                 "golden.rotations", kInvalid);
+  expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.golden.rotations = {}; }), "golden.png",
+                 kInvalid);
 }
 
 // ---- What belongs together
@@ -439,39 +571,47 @@ TEST(PackageFit, AvatarsNameTheirBody) {
   const AlignedBytes body_bytes(*body_sample.write());
   const Package body = Package::open(body_bytes.bytes(), "body.fgn").value();
   AvatarSample sample;
-  expect_refused(check_avatar_fits_body(sample.avatar, body), format_hash(sample.avatar.body_hash), StatusCode::kMismatch);
-  expect_refused(check_avatar_fits_body(sample.avatar, body), format_hash(body.content_hash()), StatusCode::kMismatch);
+  expect_refused(check_avatar_fits_body(sample.avatar, body), format_hash(sample.avatar.body_hash),
+                 StatusCode::kMismatch);
+  expect_refused(check_avatar_fits_body(sample.avatar, body), format_hash(body.content_hash()),
+                 StatusCode::kMismatch);
   sample.avatar.body_hash = body.content_hash();
   EXPECT_TRUE(check_avatar_fits_body(sample.avatar, body).ok());
 
-  const auto expect_mismatch = [&](const std::function<void(AvatarSample&)>& bend, const std::string& words) {
+  const auto expect_mismatch = [&](const std::function<void(AvatarSample&)>& bend,
+                                   const std::string& words) {
     AvatarSample bent_sample;
     bent_sample.avatar.body_hash = body.content_hash();
     bend(bent_sample);
     expect_refused(check_avatar_fits_body(bent_sample.avatar, body), words, StatusCode::kMismatch);
   };
-  expect_mismatch([](AvatarSample& s) { s.avatar.network.input_size = 16; }, "16 texels a side, the body's 8");
+  expect_mismatch([](AvatarSample& s) { s.avatar.network.input_size = 16; },
+                  "16 texels a side, the body's 8");
   expect_mismatch(
       [](AvatarSample& s) {
         s.shape.resize(3);
         s.avatar.shape = s.shape;
       },
       "3 shape coefficients, the body 2");
-  expect_mismatch([](AvatarSample& s) { s.avatar.golden.rotations = s.avatar.golden.rotations.first(8); },
-                  "golden pose has 2 joints, the body 3");
+  expect_mismatch(
+      [](AvatarSample& s) { s.avatar.golden.rotations = s.avatar.golden.rotations.first(8); },
+      "golden pose has 2 joints, the body 3");
   expect_mismatch([](AvatarSample& s) { s.avatar.pose_statistics.joints = {3}; }, "name joint 3");
 
   const AlignedBytes motion_bytes(*MotionSample().write());
   const Package motion = Package::open(motion_bytes.bytes(), "motion.fgn").value();
-  expect_refused(check_avatar_fits_body(sample.avatar, motion), "is of kind motion", StatusCode::kMismatch);
+  expect_refused(check_avatar_fits_body(sample.avatar, motion), "is of kind motion",
+                 StatusCode::kMismatch);
 }
 
 TEST(PackageFit, MotionsHaveTheBodysJoints) {
   const BodySample body;
   MotionSample motion;
-  expect_refused(check_motion_fits_body(motion.motion, body.body), "it has 2 joints, the body 3", StatusCode::kMismatch);
+  expect_refused(check_motion_fits_body(motion.motion, body.body), "it has 2 joints, the body 3",
+                 StatusCode::kMismatch);
   motion.motion.joint_names = {"pelvis", "spine1", "jaw"};
-  expect_refused(check_motion_fits_body(motion.motion, body.body), "its joint 2 is 'jaw', the body's 'head'", StatusCode::kMismatch);
+  expect_refused(check_motion_fits_body(motion.motion, body.body),
+                 "its joint 2 is 'jaw', the body's 'head'", StatusCode::kMismatch);
   motion.motion.joint_names = body.body.joint_names;
   EXPECT_TRUE(check_motion_fits_body(motion.motion, body.body).ok());
 }

@@ -1,6 +1,6 @@
-// Thousands of deterministic mutations behind renewed checksums, in memory that ends where the package ends: whatever is still accepted
-// keeps every promise of an opened package, whatever is refused gives a reason, and nothing else happens. The same mutations run under the
-// sanitizers.
+// Thousands of deterministic mutations behind renewed checksums, in memory that ends where the
+// package ends: whatever is still accepted keeps every promise of an opened package, whatever is
+// refused gives a reason, and nothing else happens. The same mutations run under the sanitizers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,14 +43,19 @@ void put(Bytes& bytes, size_t at, T value) {
 }
 
 uint32_t interesting_u32(Random& random) {
-  constexpr uint32_t kValues[] = {0, 1, 2, 3, 4, 255, 256, 1024, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFC, 0xFFFFFFFF};
-  return random.below(3) == 0 ? static_cast<uint32_t>(random.next()) : kValues[random.below(std::size(kValues))];
+  constexpr uint32_t kValues[] = {0,   1,    2,          3,          4,          255,
+                                  256, 1024, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFC, 0xFFFFFFFF};
+  return random.below(3) == 0 ? static_cast<uint32_t>(random.next())
+                              : kValues[random.below(std::size(kValues))];
 }
 
 float interesting_f32(Random& random) {
-  constexpr float kMax = std::numeric_limits<float>::max(), kTiny = std::numeric_limits<float>::denorm_min();
-  constexpr float kInfinity = std::numeric_limits<float>::infinity(), kNan = std::numeric_limits<float>::quiet_NaN();
-  constexpr float kValues[] = {0, -0.0f, 1, -1, 0.999f, 1e-6f, 1e6f, kTiny, kMax, -kMax, kInfinity, -kInfinity, kNan};
+  constexpr float kMax = std::numeric_limits<float>::max(),
+                  kTiny = std::numeric_limits<float>::denorm_min();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity(),
+                  kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kValues[] = {0,     -0.0f, 1,     -1,        0.999f,     1e-6f, 1e6f,
+                               kTiny, kMax,  -kMax, kInfinity, -kInfinity, kNan};
   return kValues[random.below(std::size(kValues))];
 }
 
@@ -61,10 +66,12 @@ void mutate(Bytes& bytes, const Seal& seal, Random& random) {
   const size_t end = std::clamp<uint64_t>(index_end, kPackageHeaderBytes + 1, bytes.size());
   switch (random.below(9)) {
     case 0:
-      bytes[random.between(kPackageHeaderBytes, end)] ^= std::byte{static_cast<uint8_t>(1u << random.below(8))};
+      bytes[random.between(kPackageHeaderBytes, end)] ^=
+          std::byte{static_cast<uint8_t>(1u << random.below(8))};
       break;
     case 1:
-      bytes[random.between(kPackageHeaderBytes, end)] = std::byte{static_cast<uint8_t>(random.next())};
+      bytes[random.between(kPackageHeaderBytes, end)] =
+          std::byte{static_cast<uint8_t>(random.next())};
       break;
     case 2:
       put(bytes, random.between(kPackageHeaderBytes, end) / 4 * 4, interesting_u32(random));
@@ -80,19 +87,26 @@ void mutate(Bytes& bytes, const Seal& seal, Random& random) {
       break;
     case 6: {
       const size_t at = seal.extent_at(random.below(seal.blob_count())) + 8 * random.below(2);
-      const uint64_t values[] = {
-          0, 64, bytes.size(), bytes.size() - 64, random.below(bytes.size()) / 64 * 64, random.next(), uint64_t{0} - 64};
+      const uint64_t values[] = {0,
+                                 64,
+                                 bytes.size(),
+                                 bytes.size() - 64,
+                                 random.below(bytes.size()) / 64 * 64,
+                                 random.next(),
+                                 uint64_t{0} - 64};
       put(bytes, at, values[random.below(std::size(values))]);
       break;
     }
     case 7: {
       layout::Header header = samples::get_header(bytes);
-      header.index_bytes = random.below(2) == 0 ? interesting_u32(random) : static_cast<uint32_t>(random.below(bytes.size()));
+      header.index_bytes = random.below(2) == 0 ? interesting_u32(random)
+                                                : static_cast<uint32_t>(random.below(bytes.size()));
       samples::put_header(bytes, header);
       break;
     }
     case 8: {
-      bytes.resize(std::max<size_t>(kPackageHeaderBytes + 64, random.below(bytes.size() + 256) / 64 * 64));
+      bytes.resize(
+          std::max<size_t>(kPackageHeaderBytes + 64, random.below(bytes.size() + 256) / 64 * 64));
       layout::Header header = samples::get_header(bytes);
       header.file_bytes = bytes.size();
       samples::put_header(bytes, header);
@@ -116,7 +130,8 @@ TEST_P(PackageMutation, NeverBreaksAPromise) {
   for (int i = 0; i < kMutations; ++i) {
     Random random(uint64_t(GetParam()) << 32 | uint64_t(i));
     Bytes bytes = *sound;
-    for (uint64_t changes = 1 + random.below(3); changes > 0; --changes) mutate(bytes, seal, random);
+    for (uint64_t changes = 1 + random.below(3); changes > 0; --changes)
+      mutate(bytes, seal, random);
     seal.renew(bytes);
     const std::span<std::byte> memory = guarded.bytes(bytes.size());
     std::memcpy(memory.data(), bytes.data(), bytes.size());
@@ -127,8 +142,10 @@ TEST_P(PackageMutation, NeverBreaksAPromise) {
       ASSERT_TRUE(samples::exercise(*package, reason)) << "mutation " << i << ": " << reason;
     } else {
       ++outcomes[to_string(package.status().code())];
-      ASSERT_EQ(package.status().message().rfind("mutant.fgn: ", 0), 0u) << package.status().message();
-      ASSERT_EQ(package.status().message().find('\n'), std::string::npos) << package.status().message();
+      ASSERT_EQ(package.status().message().rfind("mutant.fgn: ", 0), 0u)
+          << package.status().message();
+      ASSERT_EQ(package.status().message().find('\n'), std::string::npos)
+          << package.status().message();
     }
   }
   for (const auto& [outcome, count] : outcomes) std::printf("  %s: %d\n", outcome.c_str(), count);

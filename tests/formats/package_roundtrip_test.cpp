@@ -1,4 +1,5 @@
-// What goes in comes out: every field of every kind, the same bytes each time, views into the caller's bytes.
+// What goes in comes out: every field of every kind, the same bytes each time, views into the
+// caller's bytes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,11 +29,13 @@ void expect_view(const Opened& opened, std::span<const T> array) {
 void expect_same(const Provenance& a, const Provenance& b) {
   EXPECT_EQ(a.tool, b.tool);
   EXPECT_EQ(a.created, b.created);
-  EXPECT_TRUE(
-      std::ranges::equal(a.settings, b.settings, [](const auto& x, const auto& y) { return x.key == y.key && x.value == y.value; }));
+  EXPECT_TRUE(std::ranges::equal(a.settings, b.settings, [](const auto& x, const auto& y) {
+    return x.key == y.key && x.value == y.value;
+  }));
   EXPECT_EQ(a.sources, b.sources);
-  EXPECT_TRUE(
-      std::ranges::equal(a.quality, b.quality, [](const auto& x, const auto& y) { return x.name == y.name && x.value == y.value; }));
+  EXPECT_TRUE(std::ranges::equal(a.quality, b.quality, [](const auto& x, const auto& y) {
+    return x.name == y.name && x.value == y.value;
+  }));
   EXPECT_EQ(a.licence_name, b.licence_name);
   EXPECT_EQ(a.licence_url, b.licence_url);
   EXPECT_EQ(a.authors, b.authors);
@@ -127,7 +130,8 @@ void expect_same_fixed_point(const Opened& opened, const Avatar& in) {
   EXPECT_EQ(in.fixed_point.values, out.fixed_point.values);
   ASSERT_EQ(in.fixed_point.convolutions.size(), out.fixed_point.convolutions.size());
   for (size_t i = 0; i < in.fixed_point.convolutions.size(); ++i) {
-    const FixedPointConvolution &a = in.fixed_point.convolutions[i], &b = out.fixed_point.convolutions[i];
+    const FixedPointConvolution &a = in.fixed_point.convolutions[i],
+                                &b = out.fixed_point.convolutions[i];
     EXPECT_TRUE(same(a.weights, b.weights));
     EXPECT_TRUE(same(a.weight_scale, b.weight_scale));
     EXPECT_TRUE(same(a.bias, b.bias));
@@ -155,7 +159,8 @@ TEST(PackageRoundTrip, AnAvatarHoldsFloatsFixedPointOrBoth) {
   EXPECT_TRUE(two.package.avatar().holds(Precision::kFloat32));
   EXPECT_TRUE(two.package.avatar().holds(Precision::kFixedPoint));
   expect_same_fixed_point(two, both.avatar);
-  EXPECT_TRUE(same(both.avatar.network.layers[0].weights, two.package.avatar().network.layers[0].weights));
+  EXPECT_TRUE(
+      same(both.avatar.network.layers[0].weights, two.package.avatar().network.layers[0].weights));
 }
 
 TEST(PackageRoundTrip, MotionKeepsEveryField) {
@@ -217,10 +222,13 @@ TEST(PackageRoundTrip, TensorsDescribeTheWholeFile) {
 TEST(PackageHash, NamesTheContentAndNothingElse) {
   BodySample changed;
   changed.texel_position[4] += 0.5f;
-  const auto hash = [](const BodySample& sample) { return open_or_die(sample.write()).package.content_hash(); };
+  const auto hash = [](const BodySample& sample) {
+    return open_or_die(sample.write()).package.content_hash();
+  };
   EXPECT_EQ(hash(BodySample()), hash(BodySample()));
   EXPECT_NE(hash(BodySample()), hash(changed));
-  EXPECT_EQ(format_hash({0x0123456789abcdefu, 0xfedcba9876543210u}), "fedcba98765432100123456789abcdef");
+  EXPECT_EQ(format_hash({0x0123456789abcdefu, 0xfedcba9876543210u}),
+            "fedcba98765432100123456789abcdef");
 }
 
 }  // namespace

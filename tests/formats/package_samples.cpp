@@ -5,7 +5,9 @@ namespace figurine::samples {
 namespace {
 
 // Eighths in [-1, 1): a short repeating pattern, exact in binary.
-float pattern(size_t i) { return static_cast<float>(static_cast<int>((i * 7 + 3) % 16) - 8) / 8.0f; }
+float pattern(size_t i) {
+  return static_cast<float>(static_cast<int>((i * 7 + 3) % 16) - 8) / 8.0f;
+}
 
 std::vector<float> patterned(size_t count) {
   std::vector<float> values(count);
@@ -43,7 +45,8 @@ BodySample::BodySample() {
   texel = {9, 10, 17, 18, 63};
   texel_position = patterned(kTexels * 3);
   for (uint32_t i = 0; i < kTexels; ++i) {
-    const float normal[3] = {i % 3 == 0 ? 1.0f : 0.0f, i % 3 == 1 ? 1.0f : 0.0f, i % 3 == 2 ? -1.0f : 0.0f};
+    const float normal[3] = {i % 3 == 0 ? 1.0f : 0.0f, i % 3 == 1 ? 1.0f : 0.0f,
+                             i % 3 == 2 ? -1.0f : 0.0f};
     texel_normal.insert(texel_normal.end(), normal, normal + 3);
     const uint8_t joints[kSkinInfluences] = {static_cast<uint8_t>(i % kJoints), 1, 2};
     texel_joints.insert(texel_joints.end(), joints, joints + kSkinInfluences);
@@ -81,7 +84,11 @@ AvatarSample::AvatarSample() {
   avatar.shape = shape;
   avatar.map_statistics = {.mean = {0, 0.125f, 0, 0, 0, 0.25f}, .scale = {2, 2, 2, 1, 1, 0.5f}};
   avatar.fourier_octaves = 1;
-  avatar.decoding = {.offset_scale_m = 0.0625f, .spacing_scale = 0.5f, .max_log_scale = 3, .opacity_bias = 2, .sh_degree = 1};
+  avatar.decoding = {.offset_scale_m = 0.0625f,
+                     .spacing_scale = 0.5f,
+                     .max_log_scale = 3,
+                     .opacity_bias = 2,
+                     .sh_degree = 1};
   avatar.network = make_pose_unet(8, kMapChannels + 4, 2, head_channels(1));
   const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, false);
   weights.resize(avatar.network.layers.size());
@@ -89,7 +96,8 @@ AvatarSample::AvatarSample() {
   for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
     Layer& layer = avatar.network.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
-    weights[i] = patterned(size_t{layer.out_channels} * layer.kernel * layer.kernel * shapes[layer.inputs[0]].channels);
+    weights[i] = patterned(size_t{layer.out_channels} * layer.kernel * layer.kernel *
+                           shapes[layer.inputs[0]].channels);
     biases[i] = patterned(layer.out_channels);
     layer.weights = weights[i];
     layer.bias = biases[i];
@@ -101,17 +109,26 @@ AvatarSample::AvatarSample() {
   golden_png = png_start(16, 24);
   avatar.golden.root_translation_m = {0.25f, 0, -1};
   avatar.golden.rotations = golden_rotations;
-  avatar.golden.camera = {.width_px = 16, .height_px = 24, .fx_px = 20, .fy_px = 21, .cx_px = 8, .cy_px = 12.5f, .near_m = 0.125f};
+  avatar.golden.camera = {.width_px = 16,
+                          .height_px = 24,
+                          .fx_px = 20,
+                          .fy_px = 21,
+                          .cx_px = 8,
+                          .cy_px = 12.5f,
+                          .near_m = 0.125f};
   avatar.golden.camera.view_from_world = {0, 0, 1, 0.5f, 1, 0, 0, 0.25f, 0, 1, 0, 3};
   avatar.golden.background = {0.5f, 0.25f, 1};
   avatar.golden.png = golden_png;
-  budget = {.peak_memory_bytes = 1 << 20, .macs_per_frame = count_macs(avatar.network, shapes), .gaussians = 5};
+  budget = {.peak_memory_bytes = 1 << 20,
+            .macs_per_frame = count_macs(avatar.network, shapes),
+            .gaussians = 5};
 }
 
 FixedPointAvatarSample::FixedPointAvatarSample() {
   avatar.name = "sample avatar in fixed point";
   const size_t count = avatar.network.layers.size();
-  // One quantisation for all that pool, upsample and concatenation tie together; the first value is tied to nothing.
+  // One quantisation for all that pool, upsample and concatenation tie together; the first value is
+  // tied to nothing.
   avatar.fixed_point.values.assign(count, {.scale = 0.0625f, .zero_point = -3});
   avatar.fixed_point.values[0] = {.scale = 0x1p-12f, .zero_point = 0};
   avatar.fixed_point.values[1] = {.scale = 0.125f, .zero_point = -128};
@@ -122,7 +139,8 @@ FixedPointAvatarSample::FixedPointAvatarSample() {
   for (size_t i = 0; i < count; ++i) {
     Layer& layer = avatar.network.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
-    for (size_t k = 0; k < layer.weights.size(); ++k) fixed_weights[i].push_back(static_cast<int8_t>(int(k * 37 + i) % 255 - 127));
+    for (size_t k = 0; k < layer.weights.size(); ++k)
+      fixed_weights[i].push_back(static_cast<int8_t>(int(k * 37 + i) % 255 - 127));
     for (uint32_t o = 0; o < layer.out_channels; ++o) {
       fixed_scales[i].push_back(0.00390625f * static_cast<float>(o % 3 + 1));
       fixed_biases[i].push_back(static_cast<int32_t>(o * 101) - 200);
@@ -142,7 +160,8 @@ FixedPointAvatarSample& FixedPointAvatarSample::with_floats() {
   return *this;
 }
 
-PopulationSample::PopulationSample(DifferenceCoding coding) : initial(std::make_unique<AvatarSample>()) {
+PopulationSample::PopulationSample(DifferenceCoding coding)
+    : initial(std::make_unique<AvatarSample>()) {
   for (size_t m = 0; m < 3; ++m) {
     AvatarSample& sample = *avatars.emplace_back(std::make_unique<AvatarSample>());
     sample.avatar.name = m == 2 ? "m\xC3\xBCller" : "00000" + std::to_string(m);
@@ -154,7 +173,8 @@ PopulationSample::PopulationSample(DifferenceCoding coding) : initial(std::make_
     for (size_t i = 0; i < sample.weights.size(); ++i) {
       // Multiples of 2^-10 times 0 to 16: exact, and one row in three does not differ at all.
       for (size_t k = 0; k < sample.weights[i].size(); ++k) {
-        if (k % 3 != m) sample.weights[i][k] += 0x1p-10f * static_cast<float>(int((k * 5 + i) % 33) - 16);
+        if (k % 3 != m)
+          sample.weights[i][k] += 0x1p-10f * static_cast<float>(int((k * 5 + i) % 33) - 16);
       }
       for (float& bias : sample.biases[i]) bias += 0.0625f * static_cast<float>(m);
     }
@@ -164,9 +184,13 @@ PopulationSample::PopulationSample(DifferenceCoding coding) : initial(std::make_
     if (m == 1) own.quality.push_back({"psnr_view_db", 28.25});
     if (m == 2) own.licence_name = "CC-BY-4.0";
   }
-  population = {
-      .name = "sample population", .initial = initial->avatar.network, .coding = coding, .members = {}, .budget = initial->budget};
-  for (size_t m = 0; m < 3; ++m) population.members.push_back({&avatars[m]->avatar, &provenance[m], static_cast<Split>(m)});
+  population = {.name = "sample population",
+                .initial = initial->avatar.network,
+                .coding = coding,
+                .members = {},
+                .budget = initial->budget};
+  for (size_t m = 0; m < 3; ++m)
+    population.members.push_back({&avatars[m]->avatar, &provenance[m], static_cast<Split>(m)});
 }
 
 std::string to_string(SampleKind kind) {
@@ -231,8 +255,11 @@ SamplerSample::SamplerSample() {
   for (size_t token = 0; token < tokens.size(); ++token) {
     const auto rank = static_cast<uint32_t>(token % 2 + 1);
     sampler.ranks.push_back(rank);
-    for (size_t k = 0; k < rank * tokens[token]; ++k) directions.push_back(static_cast<int8_t>(int(k * 29 + token) % 255 - 127));
-    for (uint32_t k = 0; k < rank; ++k) direction_scale.push_back(token == 3 && k == 1 ? 0 : 0x1p-12f * static_cast<float>(token + 1));
+    for (size_t k = 0; k < rank * tokens[token]; ++k)
+      directions.push_back(static_cast<int8_t>(int(k * 29 + token) % 255 - 127));
+    for (uint32_t k = 0; k < rank; ++k)
+      direction_scale.push_back(token == 3 && k == 1 ? 0
+                                                     : 0x1p-12f * static_cast<float>(token + 1));
     for (size_t i = 0; i < tokens[token]; ++i) mean.push_back(pattern(i + token));
   }
   sampler.denoiser = {.d_model = 8, .blocks = 2, .heads = 2, .feed_forward = 12};
@@ -250,7 +277,9 @@ SamplerSample::SamplerSample() {
   pose_mean = avatar.pose_mean;
   pose_covariance = avatar.pose_covariance;
   golden_rotations = avatar.golden_rotations;
-  report = "{\n  \"command\": \"sample\",\n  \"held_out\": {\"psnr_pose_db\": [21.25, 20.5], \"name\": \"m\xC3\xBCller\"}\n}\n";
+  report =
+      "{\n  \"command\": \"sample\",\n  \"held_out\": {\"psnr_pose_db\": [21.25, 20.5], \"name\": "
+      "\"m\xC3\xBCller\"}\n}\n";
   sampler.mean = mean;
   sampler.directions = directions;
   sampler.direction_scale = direction_scale;
@@ -259,7 +288,8 @@ SamplerSample::SamplerSample() {
   sampler.bias = bias;
   sampler.position = position;
   sampler.norm = norm;
-  sampler.pose_statistics = {.joints = from.pose_statistics.joints, .mean = pose_mean, .covariance = pose_covariance};
+  sampler.pose_statistics = {
+      .joints = from.pose_statistics.joints, .mean = pose_mean, .covariance = pose_covariance};
   sampler.golden = from.golden;  // its picture and its hash are an avatar's
   sampler.golden.rotations = golden_rotations;
   sampler.golden.png = {};
@@ -272,9 +302,14 @@ SamplerSample::SamplerSample() {
                    .band_share = 0.75};
   sampler.steps = 16;
   sampler.method = SolverMethod::kDpmSolverPlusPlus2M;
-  sampler.golden_seeds = {
-      {.seed = 7, .steps = 16, .method = SolverMethod::kDpmSolverPlusPlus2M, .hash = {0x0102030405060708u, 0x1112131415161718u}},
-      {.seed = 0xFFFFFFFFFFFFFFFFu, .steps = 1000, .method = SolverMethod::kDdim, .hash = {0x2122232425262728u, 0x3132333435363738u}}};
+  sampler.golden_seeds = {{.seed = 7,
+                           .steps = 16,
+                           .method = SolverMethod::kDpmSolverPlusPlus2M,
+                           .hash = {0x0102030405060708u, 0x1112131415161718u}},
+                          {.seed = 0xFFFFFFFFFFFFFFFFu,
+                           .steps = 1000,
+                           .method = SolverMethod::kDdim,
+                           .hash = {0x2122232425262728u, 0x3132333435363738u}}};
   sampler.population_hash = {0x4142434445464748u, 0x5152535455565758u};
   sampler.report = report;
   budget = avatar.budget;

@@ -1,6 +1,7 @@
-// Small sound packages of each kind, with the storage behind their spans, for the tests of the package: a body of 3 joints and 5 texels on
-// an 8x8 map, an avatar of a four-resolution UNet with 2 channels, a motion of 3 frames, a sampler of such avatars. All values are exact in
-// binary, so the bytes are the same everywhere.
+// Small sound packages of each kind, with the storage behind their spans, for the tests of the
+// package: a body of 3 joints and 5 texels on an 8x8 map, an avatar of a four-resolution UNet with
+// 2 channels, a motion of 3 frames, a sampler of such avatars. All values are exact in binary, so
+// the bytes are the same everywhere.
 #pragma once
 
 #include <cstddef>
@@ -37,14 +38,17 @@ struct AvatarSample {
   AvatarSample();
   AvatarSample(const AvatarSample&) = delete;
   std::vector<float> shape;
-  std::vector<std::vector<float>> weights, biases;  // one each per layer; empty where the layer is no convolution
+  std::vector<std::vector<float>> weights,
+      biases;  // one each per layer; empty where the layer is no convolution
   std::vector<float> pose_mean, pose_covariance;
   std::vector<float> golden_rotations;
   std::vector<uint8_t> golden_png;
   Avatar avatar;
   Budget budget;
 
-  Result<std::vector<std::byte>> write() const { return write_package(avatar, budget, make_provenance()); }
+  Result<std::vector<std::byte>> write() const {
+    return write_package(avatar, budget, make_provenance());
+  }
 };
 
 // The same avatar in fixed point alone; with_floats() gives it back its float weights.
@@ -57,7 +61,8 @@ struct FixedPointAvatarSample : AvatarSample {
   FixedPointAvatarSample& with_floats();
 };
 
-// Three avatars of one network, each a little different from common initial weights: one population, in integers or in halves.
+// Three avatars of one network, each a little different from common initial weights: one
+// population, in integers or in halves.
 struct PopulationSample {
   explicit PopulationSample(DifferenceCoding coding = DifferenceCoding::kInt8);
   PopulationSample(const PopulationSample&) = delete;
@@ -95,10 +100,19 @@ struct SamplerSample {
 };
 
 // One of each, for tests of what all packages have in common.
-enum class SampleKind { kBody, kAvatar, kFixedPointAvatar, kMotion, kPopulation, kHalfPopulation, kSampler };
-inline constexpr SampleKind kSampleKinds[] = {SampleKind::kBody,   SampleKind::kAvatar,     SampleKind::kFixedPointAvatar,
-                                              SampleKind::kMotion, SampleKind::kPopulation, SampleKind::kHalfPopulation,
-                                              SampleKind::kSampler};
+enum class SampleKind {
+  kBody,
+  kAvatar,
+  kFixedPointAvatar,
+  kMotion,
+  kPopulation,
+  kHalfPopulation,
+  kSampler
+};
+inline constexpr SampleKind kSampleKinds[] = {
+    SampleKind::kBody,   SampleKind::kAvatar,     SampleKind::kFixedPointAvatar,
+    SampleKind::kMotion, SampleKind::kPopulation, SampleKind::kHalfPopulation,
+    SampleKind::kSampler};
 std::string to_string(SampleKind kind);  // also the name of its golden file: "fixed_point_avatar"
 PackageKind package_kind(SampleKind kind);
 Result<std::vector<std::byte>> write_sample(SampleKind kind);

@@ -1,5 +1,6 @@
-// Properties of the pose arithmetic (formats/src/pose.cpp): degenerate quaternions, kinematics against a float64 recursion, blends far from
-// rotations, normals against the inverse transpose in float64.
+// Properties of the pose arithmetic (formats/src/pose.cpp): degenerate quaternions, kinematics
+// against a float64 recursion, blends far from rotations, normals against the inverse transpose in
+// float64.
 #include "figurine/pose.h"
 
 #include <gtest/gtest.h>
@@ -20,11 +21,13 @@ constexpr std::array<float, 9> kIdentity{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
 // Row-major 3x3 in float64, by the textbook formula of a unit quaternion.
 std::array<double, 9> rotation64(const float* q) {
-  const double n = std::sqrt(double(q[0]) * q[0] + double(q[1]) * q[1] + double(q[2]) * q[2] + double(q[3]) * q[3]);
+  const double n = std::sqrt(double(q[0]) * q[0] + double(q[1]) * q[1] + double(q[2]) * q[2] +
+                             double(q[3]) * q[3]);
   const double w = q[0] / n, x = q[1] / n, y = q[2] / n, z = q[3] / n;
-  return {w * w + x * x - y * y - z * z, 2 * (x * y - w * z),           2 * (x * z + w * y),
-          2 * (x * y + w * z),           w * w - x * x + y * y - z * z, 2 * (y * z - w * x),
-          2 * (x * z - w * y),           2 * (y * z + w * x),           w * w - x * x - y * y + z * z};
+  return {
+      w * w + x * x - y * y - z * z, 2 * (x * y - w * z),           2 * (x * z + w * y),
+      2 * (x * y + w * z),           w * w - x * x + y * y - z * z, 2 * (y * z - w * x),
+      2 * (x * z - w * y),           2 * (y * z + w * x),           w * w - x * x - y * y + z * z};
 }
 
 std::array<double, 9> multiply64(const std::array<double, 9>& a, const std::array<double, 9>& b) {
@@ -65,9 +68,12 @@ TEST(QuaternionRotation, IsOrthonormalAndMatchesFloat64ForAnyLength) {
 }
 
 TEST(QuaternionRotation, ZeroTinyAndNotFiniteGiveTheIdentity) {
-  const float cases[][4] = {{0, 0, 0, 0},          {1e-30f, 0, 0, -1e-30f}, {kNan, 0, 0, 1},         {1, 0, kInfinity, 0},
-                            {-kInfinity, 0, 0, 0}, {0, 1e-45f, 0, 0},       {kNan, kNan, kNan, kNan}};
-  for (const auto& q : cases) EXPECT_EQ(rotation_from_quaternion(q), kIdentity) << q[0] << ' ' << q[1] << ' ' << q[2] << ' ' << q[3];
+  const float cases[][4] = {
+      {0, 0, 0, 0},          {1e-30f, 0, 0, -1e-30f}, {kNan, 0, 0, 1},         {1, 0, kInfinity, 0},
+      {-kInfinity, 0, 0, 0}, {0, 1e-45f, 0, 0},       {kNan, kNan, kNan, kNan}};
+  for (const auto& q : cases)
+    EXPECT_EQ(rotation_from_quaternion(q), kIdentity)
+        << q[0] << ' ' << q[1] << ' ' << q[2] << ' ' << q[3];
 }
 
 TEST(QuaternionRotation, OppositeSignsAreTheSameRotation) {
@@ -121,7 +127,8 @@ struct RandomSkeleton {
     std::uniform_real_distribution<float> offset(-0.3f, 0.3f);
     for (int j = 0; j < 60; ++j) {
       parents.push_back(static_cast<int16_t>(j < 30 ? j - 1 : random() % static_cast<unsigned>(j)));
-      for (int k = 0; k < 3; ++k) rest.push_back((j > 0 ? rest[size_t(3 * parents[j] + k)] : 1.0f) + offset(random));
+      for (int k = 0; k < 3; ++k)
+        rest.push_back((j > 0 ? rest[size_t(3 * parents[j] + k)] : 1.0f) + offset(random));
     }
     rotations = random_quaternions(60, random);
   }
@@ -144,15 +151,19 @@ TEST(SkinningTransforms, FollowTheRecursionInFloat64) {
         for (int i = 0; i < 3; ++i) {
           position[j][i] = position[parent][i];
           for (int k = 0; k < 3; ++k)
-            position[j][i] += rotation[parent][3 * i + k] * (double(s.rest[3 * j + k]) - s.rest[size_t(3 * parent + k)]);
+            position[j][i] += rotation[parent][3 * i + k] *
+                              (double(s.rest[3 * j + k]) - s.rest[size_t(3 * parent + k)]);
         }
       }
-      const std::array<float, 3> moved = transform_point(actual[j], &s.rest[3 * j]);  // B_j takes the joint's rest position to its place
+      const std::array<float, 3> moved = transform_point(
+          actual[j], &s.rest[3 * j]);  // B_j takes the joint's rest position to its place
       for (int i = 0; i < 3; ++i) joint_error.add(moved[i], position[j][i]);
-      for (int i = 0; i < 9; ++i) rotation_error.add(actual[j].m[4 * (i / 3) + i % 3], rotation[j][i]);
+      for (int i = 0; i < 9; ++i)
+        rotation_error.add(actual[j].m[4 * (i / 3) + i % 3], rotation[j][i]);
     }
   }
-  // Errors add up along the chain: 30 products of a few roundings each; the positions carry them over bones of 0.3 m.
+  // Errors add up along the chain: 30 products of a few roundings each; the positions carry them
+  // over bones of 0.3 m.
   EXPECT_LE(rotation_error.largest(), 5e-6);
   EXPECT_LE(joint_error.largest(), 5e-6);
 }
@@ -167,7 +178,8 @@ TEST(SkinningTransforms, RestPoseIsTheIdentity) {
   for (const Affine& transform : transforms) {
     for (int i = 0; i < 12; ++i) error.add(transform.m[i], identity.m[i]);
   }
-  EXPECT_LE(error.largest(), 5e-7);  // a bone is a difference of near numbers: exact, or off by a rounding
+  EXPECT_LE(error.largest(),
+            5e-7);  // a bone is a difference of near numbers: exact, or off by a rounding
 }
 
 TEST(Blend, OfOneTransformIsThatTransformAndUnusedSlotsAreNotRead) {
@@ -182,7 +194,8 @@ TEST(Blend, OfOneTransformIsThatTransformAndUnusedSlotsAreNotRead) {
 }
 
 TEST(Blend, ATwistOf180DegreesCollapsesToTheAxisAndStaysFinite) {
-  // The known fault of linear blend skinning: half of a turn about x against none leaves only the x axis ("candy wrapper").
+  // The known fault of linear blend skinning: half of a turn about x against none leaves only the x
+  // axis ("candy wrapper").
   Affine turned;
   turned.m = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0};
   const std::vector<Affine> transforms{Affine{}, turned};
@@ -191,7 +204,8 @@ TEST(Blend, ATwistOf180DegreesCollapsesToTheAxisAndStaysFinite) {
   const Affine blended = blend(transforms, joints, weights);
   EXPECT_EQ(blended.m, (std::array<float, 12>{1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}));
   const float across[3] = {0, 1, 0}, along[3] = {1, 0, 0};
-  EXPECT_EQ(transform_normal(blended, across), (std::array<float, 3>{0, 0, 0}));  // no direction is left: zero, not NaN
+  EXPECT_EQ(transform_normal(blended, across),
+            (std::array<float, 3>{0, 0, 0}));  // no direction is left: zero, not NaN
   EXPECT_EQ(transform_normal(blended, along), (std::array<float, 3>{0, 0, 0}));
 }
 
@@ -261,10 +275,12 @@ TEST(TransformNormal, NearlySingularBlendsGiveUnitLengthOrZero) {
     Affine a;
     for (float& value : a.m) value = normal(random);
     const float squeeze = std::pow(10.0f, -float(i % 12));
-    for (int k = 0; k < 3; ++k) a.m[8 + k] = a.m[k] + squeeze * a.m[8 + k];  // third row almost the first
+    for (int k = 0; k < 3; ++k)
+      a.m[8 + k] = a.m[k] + squeeze * a.m[8 + k];  // third row almost the first
     const float n[3] = {normal(random), normal(random), normal(random)};
     const std::array<float, 3> result = transform_normal(a, n);
-    const double length = std::sqrt(double(result[0]) * result[0] + double(result[1]) * result[1] + double(result[2]) * result[2]);
+    const double length = std::sqrt(double(result[0]) * result[0] + double(result[1]) * result[1] +
+                                    double(result[2]) * result[2]);
     EXPECT_TRUE(length == 0 || std::abs(length - 1) < 1e-6) << length;
   }
 }

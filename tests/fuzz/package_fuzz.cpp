@@ -1,5 +1,6 @@
-// Any bytes into the package reader: it refuses them or keeps its promises. Each input is opened as it is and again behind renewed
-// checksums, or the fuzzer would only ever see checksums fail. tests/golden/packages is the seed corpus.
+// Any bytes into the package reader: it refuses them or keeps its promises. Each input is opened as
+// it is and again behind renewed checksums, or the fuzzer would only ever see checksums fail.
+// tests/golden/packages is the seed corpus.
 #include <cstdint>
 #include <cstdlib>
 

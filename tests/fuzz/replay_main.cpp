@@ -1,6 +1,7 @@
-// Runs a libFuzzer entry over the files named on the command line, folders included, so that every compiler replays the corpus as a test.
-// With
-// --rounds N each file is also bent N times, deterministically. Prints how many inputs ran; none is a failure.
+// Runs a libFuzzer entry over the files named on the command line, folders included, so that every
+// compiler replays the corpus as a test. With
+// --rounds N each file is also bent N times, deterministically. Prints how many inputs ran; none is
+// a failure.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -24,7 +25,8 @@ size_t run(const std::filesystem::path& path, int rounds) {
   const auto next = [&] { return (state = state * 1664525u + 1013904223u) >> 8; };
   for (int round = 0; round < rounds && !input.empty(); ++round) {
     std::vector<uint8_t> bent = input;
-    for (uint32_t changes = 1 + next() % 4; changes > 0; --changes) bent[next() % bent.size()] = static_cast<uint8_t>(next());
+    for (uint32_t changes = 1 + next() % 4; changes > 0; --changes)
+      bent[next() % bent.size()] = static_cast<uint8_t>(next());
     if (next() % 4 == 0) bent.resize(next() % (bent.size() + 64));
     LLVMFuzzerTestOneInput(bent.data(), bent.size());
   }

@@ -1,7 +1,9 @@
-// The brute-force truth of splatting: every Gaussian at every pixel, in double, no culling box, no tiles, no vectors.
+// The brute-force truth of splatting: every Gaussian at every pixel, in double, no culling box, no
+// tiles, no vectors.
 //
-// Written from the equations of docs/numerics.md, "Splatting", and shares no code with the renderers it judges; only the depth key is float
-// arithmetic, because order is part of the definition (ascending float view depth, ties by index). Based on: Kerbl et al., 3D Gaussian
+// Written from the equations of docs/numerics.md, "Splatting", and shares no code with the
+// renderers it judges; only the depth key is float arithmetic, because order is part of the
+// definition (ascending float view depth, ties by index). Based on: Kerbl et al., 3D Gaussian
 // Splatting for Real-Time Radiance Field Rendering, 2023; Zwicker et al., EWA Splatting, 2002.
 #pragma once
 
@@ -30,8 +32,12 @@ struct Gaussians {
 };
 
 inline Gaussians from_view(const GaussianView& view) {
-  const auto widen = [](std::span<const float> values) { return std::vector<double>(values.begin(), values.end()); };
-  return {view.count, view.sh_degree, widen(view.position_m), widen(view.covariance_factor), widen(view.opacity), widen(view.sh)};
+  const auto widen = [](std::span<const float> values) {
+    return std::vector<double>(values.begin(), values.end());
+  };
+  return {
+      view.count,          view.sh_degree, widen(view.position_m), widen(view.covariance_factor),
+      widen(view.opacity), widen(view.sh)};
 }
 
 // Premultiplied accumulations and what is left of the light.
@@ -42,8 +48,12 @@ struct Image {
 
   double alpha(size_t pixel) const { return 1 - transmittance[pixel]; }
   // Straight colour: 0 where alpha is 0.
-  double straight(size_t pixel, int channel) const { return alpha(pixel) > 0 ? rgb[3 * pixel + channel] / alpha(pixel) : 0.0; }
-  double over(size_t pixel, int channel, double background) const { return rgb[3 * pixel + channel] + transmittance[pixel] * background; }
+  double straight(size_t pixel, int channel) const {
+    return alpha(pixel) > 0 ? rgb[3 * pixel + channel] / alpha(pixel) : 0.0;
+  }
+  double over(size_t pixel, int channel, double background) const {
+    return rgb[3 * pixel + channel] + transmittance[pixel] * background;
+  }
 };
 
 // One Gaussian as the image sees it.
@@ -93,49 +103,60 @@ inline Splat project(const Gaussians& gaussians, size_t i, const Camera& camera)
   if (!finite) return splat;
 
   const auto& m = camera.view_from_world;
-  const float px = static_cast<float>(p[0]), py = static_cast<float>(p[1]), pz = static_cast<float>(p[2]);
-  volatile float left = m[8] * px, left2 = m[9] * py, right = m[10] * pz;  // volatile: each product is rounded to float, no FMA
+  const float px = static_cast<float>(p[0]), py = static_cast<float>(p[1]),
+              pz = static_cast<float>(p[2]);
+  volatile float left = m[8] * px, left2 = m[9] * py,
+                 right = m[10] * pz;  // volatile: each product is rounded to float, no FMA
   splat.depth = (left + left2) + (right + m[11]);
   if (!(splat.depth > camera.near_m)) return splat;
 
   double v[3];
-  for (int r = 0; r < 3; ++r) v[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
+  for (int r = 0; r < 3; ++r)
+    v[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
   const double fx = camera.fx_px, fy = camera.fy_px, cx = camera.cx_px, cy = camera.cy_px;
   splat.mean_px[0] = fx * v[0] / v[2] + cx;
   splat.mean_px[1] = fy * v[1] / v[2] + cy;
 
-  // The Jacobian's tangents stay within the image's own range, widened by 0.15 of the side each way (1.3 tan(fov/2) for a centred principal
-  // point).
-  const double margin = 0.5 * (double(kFrustumClamp) - 1), w = camera.width_px, h = camera.height_px;
+  // The Jacobian's tangents stay within the image's own range, widened by 0.15 of the side each way
+  // (1.3 tan(fov/2) for a centred principal point).
+  const double margin = 0.5 * (double(kFrustumClamp) - 1), w = camera.width_px,
+               h = camera.height_px;
   const double tx = std::clamp(v[0] / v[2], -(cx + margin * w) / fx, (w - cx + margin * w) / fx);
   const double ty = std::clamp(v[1] / v[2], -(cy + margin * h) / fy, (h - cy + margin * h) / fy);
   double row_x[3], row_y[3];
   for (int k = 0; k < 3; ++k) {
     double g[3];
-    for (int r = 0; r < 3; ++r) g[r] = m[4 * r] * F[k] + m[4 * r + 1] * F[3 + k] + m[4 * r + 2] * F[6 + k];
+    for (int r = 0; r < 3; ++r)
+      g[r] = m[4 * r] * F[k] + m[4 * r + 1] * F[3 + k] + m[4 * r + 2] * F[6 + k];
     row_x[k] = fx / v[2] * (g[0] - tx * g[2]);
     row_y[k] = fy / v[2] * (g[1] - ty * g[2]);
   }
   const double e = kDilationPx2;
   const double xx = row_x[0] * row_x[0] + row_x[1] * row_x[1] + row_x[2] * row_x[2];
   const double yy = row_y[0] * row_y[0] + row_y[1] * row_y[1] + row_y[2] * row_y[2];
-  const double minors[3] = {row_x[1] * row_y[2] - row_x[2] * row_y[1], row_x[2] * row_y[0] - row_x[0] * row_y[2],
+  const double minors[3] = {row_x[1] * row_y[2] - row_x[2] * row_y[1],
+                            row_x[2] * row_y[0] - row_x[0] * row_y[2],
                             row_x[0] * row_y[1] - row_x[1] * row_y[0]};
   splat.a = xx + e;
   splat.b = row_x[0] * row_y[0] + row_x[1] * row_y[1] + row_x[2] * row_y[2];
   splat.c = yy + e;
-  splat.determinant = minors[0] * minors[0] + minors[1] * minors[1] + minors[2] * minors[2] + e * (xx + yy) + e * e;
-  if (!std::isfinite(splat.determinant) || !std::isfinite(splat.mean_px[0]) || !std::isfinite(splat.mean_px[1])) return splat;
+  splat.determinant =
+      minors[0] * minors[0] + minors[1] * minors[1] + minors[2] * minors[2] + e * (xx + yy) + e * e;
+  if (!std::isfinite(splat.determinant) || !std::isfinite(splat.mean_px[0]) ||
+      !std::isfinite(splat.mean_px[1]))
+    return splat;
 
   double direction[3], length2 = 0;
   for (int k = 0; k < 3; ++k) {
     direction[k] = p[k];
-    for (int r = 0; r < 3; ++r) direction[k] += double(m[4 * r + k]) * m[4 * r + 3];  // camera centre = -R^T t
+    for (int r = 0; r < 3; ++r)
+      direction[k] += double(m[4 * r + k]) * m[4 * r + 3];  // camera centre = -R^T t
     length2 += direction[k] * direction[k];
   }
   double basis[16];
   const double length = std::sqrt(length2);
-  sh_basis(gaussians.sh_degree, direction[0] / length, direction[1] / length, direction[2] / length, basis);
+  sh_basis(gaussians.sh_degree, direction[0] / length, direction[1] / length, direction[2] / length,
+           basis);
   for (int channel = 0; channel < 3; ++channel) {
     double value = kShOffset;
     for (uint32_t k = 0; k < coefficients; ++k) value += basis[k] * sh[3 * k + channel];
@@ -153,7 +174,8 @@ inline double power_at(const Splat& splat, double dx, double dy) {
 
 struct Options {
   double alpha_cut = kAlphaCut;
-  bool skip_far_pixels = true;  // leave out pixels outside the ellipse's bounding box (they fail the alpha cut): only saves time
+  bool skip_far_pixels = true;  // leave out pixels outside the ellipse's bounding box (they fail
+                                // the alpha cut): only saves time
 };
 
 inline Image render(const Gaussians& gaussians, const Camera& camera, const Options& options = {}) {
@@ -162,17 +184,20 @@ inline Image render(const Gaussians& gaussians, const Camera& camera, const Opti
     const Splat splat = project(gaussians, i, camera);
     if (splat.visible) splats.push_back(splat);
   }
-  std::stable_sort(splats.begin(), splats.end(), [](const Splat& a, const Splat& b) { return a.depth < b.depth; });
+  std::stable_sort(splats.begin(), splats.end(),
+                   [](const Splat& a, const Splat& b) { return a.depth < b.depth; });
 
   const size_t pixels = size_t(camera.width_px) * camera.height_px;
-  Image image{camera.width_px, camera.height_px, std::vector<double>(3 * pixels, 0.0), std::vector<double>(pixels, 1.0)};
+  Image image{camera.width_px, camera.height_px, std::vector<double>(3 * pixels, 0.0),
+              std::vector<double>(pixels, 1.0)};
   std::vector<uint8_t> stopped(pixels, 0);
   for (const Splat& splat : splats) {
     if (!(splat.opacity >= options.alpha_cut)) continue;
     int64_t x0 = 0, x1 = camera.width_px, y0 = 0, y1 = camera.height_px;
     if (options.skip_far_pixels) {  // generous: two pixels and 1 % beyond where alpha = cut
       const double reach = 2 * std::log(splat.opacity / options.alpha_cut);
-      const double rx = 1.01 * std::sqrt(reach * splat.a) + 2, ry = 1.01 * std::sqrt(reach * splat.c) + 2;
+      const double rx = 1.01 * std::sqrt(reach * splat.a) + 2,
+                   ry = 1.01 * std::sqrt(reach * splat.c) + 2;
       const auto pixel = [](double value, int64_t limit) {
         return static_cast<int64_t>(std::clamp(value, 0.0, static_cast<double>(limit)));
       };
@@ -183,7 +208,8 @@ inline Image render(const Gaussians& gaussians, const Camera& camera, const Opti
       for (int64_t x = x0; x < x1; ++x) {
         const size_t pixel = static_cast<size_t>(y) * camera.width_px + static_cast<size_t>(x);
         if (stopped[pixel]) continue;
-        const double power = power_at(splat, x + 0.5 - splat.mean_px[0], y + 0.5 - splat.mean_px[1]);
+        const double power =
+            power_at(splat, x + 0.5 - splat.mean_px[0], y + 0.5 - splat.mean_px[1]);
         if (power > 0) continue;
         const double alpha = std::min(double(kAlphaMax), splat.opacity * std::exp(power));
         if (alpha < options.alpha_cut) continue;
@@ -204,20 +230,23 @@ inline Image render(const Gaussians& gaussians, const Camera& camera, const Opti
 
 // PSNR for values whose peak is 1; infinity for no error.
 inline double psnr_db(double squared_error, size_t values) {
-  return squared_error > 0 ? -10 * std::log10(squared_error / static_cast<double>(values)) : std::numeric_limits<double>::infinity();
+  return squared_error > 0 ? -10 * std::log10(squared_error / static_cast<double>(values))
+                           : std::numeric_limits<double>::infinity();
 }
 
-// PSNR over the pixels whose true alpha exceeds 0.5, both images over mid-grey. premultiplied: [height,width,4] R, G, B, alpha of the image
-// to judge.
+// PSNR over the pixels whose true alpha exceeds 0.5, both images over mid-grey. premultiplied:
+// [height,width,4] R, G, B, alpha of the image to judge.
 template <class Scalar>
-double foreground_psnr_db(const Image& truth, std::span<const Scalar> premultiplied, double background = 0.5) {
+double foreground_psnr_db(const Image& truth, std::span<const Scalar> premultiplied,
+                          double background = 0.5) {
   double squared_error = 0;
   size_t values = 0;
   for (size_t pixel = 0; pixel < truth.transmittance.size(); ++pixel) {
     if (!(truth.alpha(pixel) > 0.5)) continue;
     const Scalar* value = &premultiplied[4 * pixel];
     for (int channel = 0; channel < 3; ++channel) {
-      const double difference = value[channel] + (1 - double(value[3])) * background - truth.over(pixel, channel, background);
+      const double difference = value[channel] + (1 - double(value[3])) * background -
+                                truth.over(pixel, channel, background);
       squared_error += difference * difference;
     }
     values += 3;

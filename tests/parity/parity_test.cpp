@@ -1,4 +1,5 @@
-// Train, pack, open, and hold the runtime's picture against the trainer's: the whole line at the smallest size.
+// Train, pack, open, and hold the runtime's picture against the trainer's: the whole line at the
+// smallest size.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -27,14 +28,19 @@ struct PackedRun {
   std::string run = folder.path("run"), path = folder.path("avatar.fgn");
 
   explicit PackedRun(TemplateMode mode) {
-    train::TrainRequest request{
-        .data = small_capture().data, .body = small_capture().body, .run = run, .settings = train::preset_settings("nano"), .quiet = true};
+    train::TrainRequest request{.data = small_capture().data,
+                                .body = small_capture().body,
+                                .run = run,
+                                .settings = train::preset_settings("nano"),
+                                .quiet = true};
     request.settings.template_mode = mode;
     request.settings.schedule.budget = {.iterations = 200, .seconds = 0};
     request.settings.threads = 1;
     train::train_avatar(request);
     train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = run});
-    throw_if_error(ports::write_file_atomically(path, train::pack_avatar(avatar, {run}, {.name = "swinger"})), path);
+    throw_if_error(
+        ports::write_file_atomically(path, train::pack_avatar(avatar, {run}, {.name = "swinger"})),
+        path);
   }
 };
 
@@ -49,9 +55,11 @@ void expect_parity(TemplateMode mode) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
   const train::PackageFile package = train::open_package(packed.path, PackageKind::kAvatar);
   const ParityReport report = compare_with_runtime(avatar, package.package.avatar(), {.views = 6});
-  std::printf("parity %.2f dB, worst %.2f dB, largest error %.3g\n", report.psnr_db, report.worst_psnr_db, report.largest_error);
+  std::printf("parity %.2f dB, worst %.2f dB, largest error %.3g\n", report.psnr_db,
+              report.worst_psnr_db, report.largest_error);
   ASSERT_EQ(report.views.size(), 6u);
-  for (const ParityView& view : report.views) EXPECT_GT(view.foreground, 100u) << "the person is not in the picture";
+  for (const ParityView& view : report.views)
+    EXPECT_GT(view.foreground, 100u) << "the person is not in the picture";
   EXPECT_GE(report.worst_psnr_db, kWanted_db);
 }
 
@@ -73,7 +81,8 @@ TEST(Pack, SaysWhatADeviceNeedsToKnow) {
   EXPECT_EQ(avatar.pose_statistics.covariance.size(), 63u * 63u);
   EXPECT_EQ(file.package.provenance().depicted_person, "synthetic");
   EXPECT_FALSE(file.package.provenance().sources.empty());
-  const Result<ports::ImageU8> golden = ports::decode_png(std::as_bytes(avatar.golden.png), "golden");
+  const Result<ports::ImageU8> golden =
+      ports::decode_png(std::as_bytes(avatar.golden.png), "golden");
   ASSERT_TRUE(golden.ok()) << golden.status().message();
   EXPECT_EQ(golden->width_px, avatar.golden.camera.width_px);
   // A picture of somebody, not of the background.
@@ -85,22 +94,28 @@ TEST(Pack, SaysWhatADeviceNeedsToKnow) {
   EXPECT_EQ(run.fixed_point_hash, (std::array<uint64_t, 2>{0, 0}));
 }
 
-// The trainer's imitation and the device's integers make the same head, so only the splatters' sums differ.
+// The trainer's imitation and the device's integers make the same head, so only the splatters' sums
+// differ.
 TEST(Parity, InFixedPointIsAtLeast60dB) {
   const PackedRun& packed = packed_run(TemplateMode::kShaped);
   train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
   std::vector<float> storage;
   const Network network = avatar.model().unet().export_network(storage);
-  const quantize::QuantisedNetwork quantised(network, quantize::choose_scales(network, quantize::observe_activations(avatar, 8), {}));
+  const quantize::QuantisedNetwork quantised(
+      network, quantize::choose_scales(network, quantize::observe_activations(avatar, 8), {}));
   const TemporaryFolder folder;
   const std::string path = folder.path("q8.fgn");
   const train::PackOptions options{.float_weights = false, .fixed_point = quantised.view()};
-  throw_if_error(ports::write_file_atomically(path, train::pack_avatar(avatar, {packed.run}, options)), path);
+  throw_if_error(
+      ports::write_file_atomically(path, train::pack_avatar(avatar, {packed.run}, options)), path);
   const train::PackageFile file = train::open_package(path, PackageKind::kAvatar);
   EXPECT_FALSE(file.package.avatar().holds(Precision::kFloat32));
-  EXPECT_LT(double(std::filesystem::file_size(path)), 0.6 * double(std::filesystem::file_size(packed.path)));  // nano: its index is half
-  const ParityReport report = compare_with_runtime(avatar, file.package.avatar(), {.views = 6, .precision = Precision::kFixedPoint});
-  std::printf("fixed point: %.2f dB, worst %.2f dB, largest error %.3g\n", report.psnr_db, report.worst_psnr_db, report.largest_error);
+  EXPECT_LT(double(std::filesystem::file_size(path)),
+            0.6 * double(std::filesystem::file_size(packed.path)));  // nano: its index is half
+  const ParityReport report = compare_with_runtime(
+      avatar, file.package.avatar(), {.views = 6, .precision = Precision::kFixedPoint});
+  std::printf("fixed point: %.2f dB, worst %.2f dB, largest error %.3g\n", report.psnr_db,
+              report.worst_psnr_db, report.largest_error);
   EXPECT_GE(report.worst_psnr_db, kWanted_db);
   const train::PackageFile body = train::open_package(small_capture().body, PackageKind::kBody);
   const GoldenRun run = draw_golden_frame(file.package, body.package);
@@ -113,16 +128,18 @@ TEST(Population, OfARunCostsLessThanItMay) {
   const std::string folder = std::filesystem::path(packed.path).parent_path();
   for (const DifferenceCoding coding : {DifferenceCoding::kInt8, DifferenceCoding::kHalf}) {
     const std::string path = folder + "/population.fgn";
-    const std::vector<std::byte> bytes = train::pack_population({.inputs = {packed.run}, .coding = coding, .quiet = true});
+    const std::vector<std::byte> bytes =
+        train::pack_population({.inputs = {packed.run}, .coding = coding, .quiet = true});
     throw_if_error(ports::write_file_atomically(path, bytes), path);
     train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
     const train::AvatarFile member = train::open_avatar(path + "#" + capture::identity_name(0));
     std::filesystem::remove(path);  // the map stays
-    const nlohmann::json report = evaluate::evaluate_requantization(avatar, member.avatar, {.quiet = true});
+    const nlohmann::json report =
+        evaluate::evaluate_requantization(avatar, member.avatar, {.quiet = true});
     const ParityReport parity = compare_with_runtime(avatar, member.avatar, {.views = 6});
     const double loss_db = report.at("poses").at("loss_db");
-    std::printf("%s: %zu bytes, loss %.4f dB, to the run's own pictures %.1f dB\n", to_string(coding), bytes.size(), loss_db,
-                parity.psnr_db);
+    std::printf("%s: %zu bytes, loss %.4f dB, to the run's own pictures %.1f dB\n",
+                to_string(coding), bytes.size(), loss_db, parity.psnr_db);
     EXPECT_LE(std::abs(loss_db), 0.2);
     EXPECT_GE(parity.psnr_db, coding == DifferenceCoding::kInt8 ? 40 : 55);
   }
@@ -131,7 +148,8 @@ TEST(Population, OfARunCostsLessThanItMay) {
 TEST(Pack, IsTheSameBytesTwice) {
   const PackedRun& packed = packed_run(TemplateMode::kShaped);
   train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
-  const std::vector<std::byte> once = train::pack_avatar(avatar, {packed.run}, {}), twice = train::pack_avatar(avatar, {packed.run}, {});
+  const std::vector<std::byte> once = train::pack_avatar(avatar, {packed.run}, {}),
+                               twice = train::pack_avatar(avatar, {packed.run}, {});
   EXPECT_EQ(once.size(), twice.size());
   EXPECT_EQ(std::memcmp(once.data(), twice.data(), once.size()), 0);
 }

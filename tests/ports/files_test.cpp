@@ -32,8 +32,12 @@ class Files : public testing::Test {
     for (const auto& entry : std::filesystem::directory_iterator(folder_)) n += entry.exists();
     return n;
   }
-  static std::span<const std::byte> bytes(const std::string& text) { return std::as_bytes(std::span(text)); }
-  static std::string text(std::span<const std::byte> data) { return {reinterpret_cast<const char*>(data.data()), data.size()}; }
+  static std::span<const std::byte> bytes(const std::string& text) {
+    return std::as_bytes(std::span(text));
+  }
+  static std::string text(std::span<const std::byte> data) {
+    return {reinterpret_cast<const char*>(data.data()), data.size()};
+  }
 
   std::string folder_;
 };
@@ -115,13 +119,16 @@ TEST_F(Files, OneLockHoldsAFolder) {
   {
     Result<FolderLock> lock = FolderLock::acquire(folder_);
     ASSERT_TRUE(lock.ok()) << lock.status().message();
-    EXPECT_EQ(FolderLock::acquire(folder_).status().message(), folder_ + ": another process is at work in it");
+    EXPECT_EQ(FolderLock::acquire(folder_).status().message(),
+              folder_ + ": another process is at work in it");
     const FolderLock moved = std::move(*lock);
     EXPECT_FALSE(FolderLock::acquire(folder_).ok());
     EXPECT_EQ(entries(), 0u) << "it leaves no file";
   }
   EXPECT_TRUE(FolderLock::acquire(folder_).ok());
-  EXPECT_NE(FolderLock::acquire(path("nowhere")).status().message().find("nowhere: cannot be opened"), std::string::npos);
+  EXPECT_NE(
+      FolderLock::acquire(path("nowhere")).status().message().find("nowhere: cannot be opened"),
+      std::string::npos);
 }
 
 TEST_F(Files, WriteIntoMissingFolderLeavesNothing) {

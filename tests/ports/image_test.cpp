@@ -14,7 +14,9 @@
 namespace figurine::ports {
 namespace {
 
-std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
 
 ImageU8 random_image(uint32_t width, uint32_t height, uint32_t channels) {
   std::mt19937 random(width * 31 + height * 7 + channels);
@@ -45,7 +47,8 @@ TEST(Png, TheSamePixelsGiveTheSameBytes) {
 }
 
 TEST(Png, ReadsBytesMadeByHand) {
-  // 2x1 RGB, red and blue: signature, IHDR, IDAT with a stored block, IEND. Checksums are worked out here.
+  // 2x1 RGB, red and blue: signature, IHDR, IDAT with a stored block, IEND. Checksums are worked
+  // out here.
   std::vector<unsigned char> png = {0x89, 'P', 'N', 'G', 13, 10, 26, 10};
   const auto crc = [](const std::vector<unsigned char>& data) {
     uint32_t c = 0xffffffffu;
@@ -59,7 +62,8 @@ TEST(Png, ReadsBytesMadeByHand) {
     std::vector<unsigned char> checked(type, type + 4);
     checked.insert(checked.end(), data.begin(), data.end());
     const auto put = [&](uint32_t value) {
-      for (int shift = 24; shift >= 0; shift -= 8) png.push_back(static_cast<unsigned char>(value >> shift));
+      for (int shift = 24; shift >= 0; shift -= 8)
+        png.push_back(static_cast<unsigned char>(value >> shift));
     };
     put(static_cast<uint32_t>(data.size()));
     png.insert(png.end(), checked.begin(), checked.end());
@@ -71,7 +75,9 @@ TEST(Png, ReadsBytesMadeByHand) {
   for (const unsigned char byte : row) a = (a + byte) % 65521, b = (b + a) % 65521;
   std::vector<unsigned char> stream = {0x78, 1, 1, 7, 0, 0xf8, 0xff};
   stream.insert(stream.end(), row.begin(), row.end());
-  for (const uint32_t part : {b, a}) stream.insert(stream.end(), {static_cast<unsigned char>(part >> 8), static_cast<unsigned char>(part)});
+  for (const uint32_t part : {b, a})
+    stream.insert(stream.end(),
+                  {static_cast<unsigned char>(part >> 8), static_cast<unsigned char>(part)});
   chunk("IDAT", stream);
   chunk("IEND", {});
   const Result<ImageU8> image = decode_png(std::as_bytes(std::span(png)), "x.png");
@@ -82,7 +88,8 @@ TEST(Png, ReadsBytesMadeByHand) {
 TEST(Png, BrokenFilesAreErrors) {
   const std::vector<std::byte> png = *encode_png(random_image(20, 20, 3));
   EXPECT_FALSE(decode_png({}, "x.png").ok());
-  for (size_t length = 0; length + 12 < png.size(); length += 7) {  // the last chunk carries no pixels
+  for (size_t length = 0; length + 12 < png.size();
+       length += 7) {  // the last chunk carries no pixels
     const Result<ImageU8> image = decode_png(std::span(png).first(length), "x.png");
     ASSERT_FALSE(image.ok()) << length;
     EXPECT_TRUE(image.status().message().starts_with("x.png: png: ")) << image.status().message();
@@ -115,13 +122,16 @@ TEST(Pfm, KnownBytesBottomRowFirst) {
 TEST(Pfm, RoundTripKeepsEveryBit) {
   for (const uint32_t channels : {1u, 3u, 4u}) {
     ImageF32 image(5, 3, channels);
-    for (size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = 0.1f * static_cast<float>(i) - 1;
+    for (size_t i = 0; i < image.pixels.size(); ++i)
+      image.pixels[i] = 0.1f * static_cast<float>(i) - 1;
     image.pixels[0] = std::numeric_limits<float>::infinity();
     image.pixels[1] = -0.0f;
     const Result<ImageF32> back = decode_pfm(*encode_pfm(image), "x.pfm");
     ASSERT_TRUE(back.ok()) << back.status().message();
     EXPECT_EQ(back->channels, channels);
-    EXPECT_EQ(std::memcmp(back->pixels.data(), image.pixels.data(), image.pixels.size() * sizeof(float)), 0);
+    EXPECT_EQ(
+        std::memcmp(back->pixels.data(), image.pixels.data(), image.pixels.size() * sizeof(float)),
+        0);
   }
 }
 
@@ -134,10 +144,13 @@ TEST(Pfm, ReadsBigEndian) {
 
 TEST(Pfm, BrokenFilesAreErrors) {
   const std::vector<std::byte> sound = *encode_pfm(ImageF32(3, 2, 4));
-  for (size_t length = 0; length < sound.size(); ++length) EXPECT_FALSE(decode_pfm(std::span(sound).first(length), "x.pfm").ok()) << length;
-  for (const std::string& text : {std::string("P6\n1 1\n-1.0\n0000"), std::string("PF\n0 1\n-1.0\n"), std::string("PF\n1 -1\n-1.0\n"),
-                                  std::string("Pf\n1 1\n0.0\n0000"), std::string("Pf\n1 1\nnan\n0000"), std::string("Pf\n1 1\n-1.0\n00000"),
-                                  std::string("Pf\n99999999 99999999\n-1.0\n0000")}) {
+  for (size_t length = 0; length < sound.size(); ++length)
+    EXPECT_FALSE(decode_pfm(std::span(sound).first(length), "x.pfm").ok()) << length;
+  for (const std::string& text :
+       {std::string("P6\n1 1\n-1.0\n0000"), std::string("PF\n0 1\n-1.0\n"),
+        std::string("PF\n1 -1\n-1.0\n"), std::string("Pf\n1 1\n0.0\n0000"),
+        std::string("Pf\n1 1\nnan\n0000"), std::string("Pf\n1 1\n-1.0\n00000"),
+        std::string("Pf\n99999999 99999999\n-1.0\n0000")}) {
     const Result<ImageF32> image = decode_pfm(bytes_of(text), "x.pfm");
     ASSERT_FALSE(image.ok()) << text;
     EXPECT_EQ(image.status().code(), StatusCode::kCorrupt);

@@ -1,4 +1,5 @@
-// Video: the header, planes and colours of y4m by hand, and that neither kind of file leaves anything half-written.
+// Video: the header, planes and colours of y4m by hand, and that neither kind of file leaves
+// anything half-written.
 #include "ports/linux/video.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,8 @@ namespace {
 class Folder {
  public:
   Folder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "figurine-video-XXXXXX").string();
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "figurine-video-XXXXXX").string();
     FIG_CHECK(::mkdtemp(pattern.data()) != nullptr, "no temporary folder");
     path_ = pattern;
   }
@@ -29,7 +31,9 @@ class Folder {
     std::filesystem::remove_all(path_, error);
   }
   std::string path(const std::string& name) const { return (path_ / name).string(); }
-  size_t files() const { return static_cast<size_t>(std::distance(std::filesystem::directory_iterator(path_), {})); }
+  size_t files() const {
+    return static_cast<size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
+  }
   std::string read(const std::string& name) const {
     std::ifstream file(path(name), std::ios::binary);
     std::ostringstream content;
@@ -43,7 +47,8 @@ class Folder {
 
 ImageU8 plain(uint32_t width, uint32_t height, uint8_t r, uint8_t g, uint8_t b) {
   ImageU8 image(width, height, 3);
-  for (size_t i = 0; i < image.pixels.size(); i += 3) image.pixels[i] = r, image.pixels[i + 1] = g, image.pixels[i + 2] = b;
+  for (size_t i = 0; i < image.pixels.size(); i += 3)
+    image.pixels[i] = r, image.pixels[i + 1] = g, image.pixels[i + 2] = b;
   return image;
 }
 
@@ -53,7 +58,8 @@ struct Codes {
 Codes codes_of(uint32_t height, uint8_t r, uint8_t g, uint8_t b) {
   std::vector<std::byte> out;
   append_y4m_frame(plain(2, height, r, g, b), out);
-  return {static_cast<int>(out[6]), static_cast<int>(out[6 + 2 * height]), static_cast<int>(out[6 + 2 * height + height / 2])};
+  return {static_cast<int>(out[6]), static_cast<int>(out[6 + 2 * height]),
+          static_cast<int>(out[6 + 2 * height + height / 2])};
 }
 
 // The bars of ITU-R BT.601 and BT.709 in 8-bit limited range, as printed in every table of them.
@@ -112,13 +118,15 @@ TEST(FrameRate, FractionsAreExact) {
 TEST(VideoWriter, Y4mAppearsWholeOrNotAtAll) {
   const Folder folder;
   {
-    auto writer = VideoWriter::create(folder.path("x.y4m"), {.width_px = 4, .height_px = 4, .rate = {}});
+    auto writer =
+        VideoWriter::create(folder.path("x.y4m"), {.width_px = 4, .height_px = 4, .rate = {}});
     ASSERT_TRUE(writer.ok());
     ASSERT_TRUE((*writer)->add(plain(4, 4, 1, 2, 3)).ok());
     EXPECT_FALSE(std::filesystem::exists(folder.path("x.y4m")));
   }
   EXPECT_EQ(folder.files(), 0u) << "abandoned";
-  auto writer = VideoWriter::create(folder.path("x.y4m"), {.width_px = 4, .height_px = 4, .rate = {}});
+  auto writer =
+      VideoWriter::create(folder.path("x.y4m"), {.width_px = 4, .height_px = 4, .rate = {}});
   ASSERT_TRUE((*writer)->add(plain(4, 4, 1, 2, 3)).ok());
   ASSERT_TRUE((*writer)->finish().ok());
   EXPECT_EQ(folder.files(), 1u);
@@ -127,47 +135,54 @@ TEST(VideoWriter, Y4mAppearsWholeOrNotAtAll) {
   EXPECT_EQ(std::filesystem::file_size(folder.path("x.y4m")), header.size() + 6 + 16 + 8);
 }
 
-bool has_ffmpeg() { return std::system("ffmpeg -hide_banner -encoders 2> /dev/null | grep -q libx264") == 0; }
+bool has_ffmpeg() {
+  return std::system("ffmpeg -hide_banner -encoders 2> /dev/null | grep -q libx264") == 0;
+}
 
 TEST(VideoWriter, Mp4KeepsColoursAndSizesThroughFfmpeg) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg with libx264 on this machine";
   const Folder folder;
-  auto writer = VideoWriter::create(folder.path("x.mp4"), {.width_px = 64, .height_px = 48, .rate = {25, 1}});
+  auto writer =
+      VideoWriter::create(folder.path("x.mp4"), {.width_px = 64, .height_px = 48, .rate = {25, 1}});
   ASSERT_TRUE(writer.ok()) << writer.status().message();
   for (int i = 0; i < 5; ++i) ASSERT_TRUE((*writer)->add(plain(64, 48, 200, 120, 40)).ok());
   const Status status = (*writer)->finish();
   ASSERT_TRUE(status.ok()) << status.message();
   EXPECT_EQ(folder.files(), 1u);
-  const std::string decode =
-      "ffmpeg -hide_banner -loglevel error -i " + folder.path("x.mp4") + " -f rawvideo -pix_fmt rgb24 " + folder.path("raw");
+  const std::string decode = "ffmpeg -hide_banner -loglevel error -i " + folder.path("x.mp4") +
+                             " -f rawvideo -pix_fmt rgb24 " + folder.path("raw");
   ASSERT_EQ(std::system(decode.c_str()), 0);
   const std::string raw = folder.read("raw");
   ASSERT_EQ(raw.size(), 5u * 64 * 48 * 3);
   const int expected[] = {200, 120, 40};
-  for (size_t i = 0; i < raw.size(); ++i) ASSERT_NEAR(static_cast<unsigned char>(raw[i]), expected[i % 3], 4) << i;
+  for (size_t i = 0; i < raw.size(); ++i)
+    ASSERT_NEAR(static_cast<unsigned char>(raw[i]), expected[i % 3], 4) << i;
 }
 
 TEST(VideoWriter, Y4mColoursAreWhatFfmpegSees) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg on this machine";
   const Folder folder;
-  auto writer = VideoWriter::create(folder.path("x.y4m"), {.width_px = 16, .height_px = 16, .rate = {}});
+  auto writer =
+      VideoWriter::create(folder.path("x.y4m"), {.width_px = 16, .height_px = 16, .rate = {}});
   ASSERT_TRUE((*writer)->add(plain(16, 16, 30, 180, 220)).ok());
   ASSERT_TRUE((*writer)->finish().ok());
-  ASSERT_EQ(
-      std::system(
-          ("ffmpeg -hide_banner -loglevel error -i " + folder.path("x.y4m") + " -f rawvideo -pix_fmt rgb24 " + folder.path("raw")).c_str()),
-      0);
+  ASSERT_EQ(std::system(("ffmpeg -hide_banner -loglevel error -i " + folder.path("x.y4m") +
+                         " -f rawvideo -pix_fmt rgb24 " + folder.path("raw"))
+                            .c_str()),
+            0);
   const std::string raw = folder.read("raw");
   ASSERT_EQ(raw.size(), 16u * 16 * 3);
   const int expected[] = {30, 180, 220};
-  for (size_t i = 0; i < raw.size(); ++i) ASSERT_NEAR(static_cast<unsigned char>(raw[i]), expected[i % 3], 3) << i;
+  for (size_t i = 0; i < raw.size(); ++i)
+    ASSERT_NEAR(static_cast<unsigned char>(raw[i]), expected[i % 3], 3) << i;
 }
 
 TEST(VideoWriter, AnAbandonedMp4LeavesNothing) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg on this machine";
   const Folder folder;
   {
-    auto writer = VideoWriter::create(folder.path("x.mp4"), {.width_px = 64, .height_px = 48, .rate = {}});
+    auto writer =
+        VideoWriter::create(folder.path("x.mp4"), {.width_px = 64, .height_px = 48, .rate = {}});
     ASSERT_TRUE(writer.ok());
     ASSERT_TRUE((*writer)->add(plain(64, 48, 1, 2, 3)).ok());
   }
@@ -176,7 +191,8 @@ TEST(VideoWriter, AnAbandonedMp4LeavesNothing) {
 
 TEST(VideoWriter, OtherNamesAreUnsupported) {
   const Folder folder;
-  const auto writer = VideoWriter::create(folder.path("x.avi"), {.width_px = 4, .height_px = 4, .rate = {}});
+  const auto writer =
+      VideoWriter::create(folder.path("x.avi"), {.width_px = 4, .height_px = 4, .rate = {}});
   ASSERT_FALSE(writer.ok());
   EXPECT_EQ(writer.status().code(), StatusCode::kUnsupported);
 }

@@ -1,8 +1,8 @@
-// A frame allocates nothing after the first, XNNPACK and the thread pool included; and what the renderer says it holds is about what it
-// took.
+// A frame allocates nothing after the first, XNNPACK and the thread pool included; and what the
+// renderer says it holds is about what it took.
 //
-// This program replaces malloc and its kin by counting ones over glibc's own; under a sanitizer, which does the same, the counts are not
-// available.
+// This program replaces malloc and its kin by counting ones over glibc's own; under a sanitizer,
+// which does the same, the counts are not available.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
@@ -36,11 +36,15 @@ void __libc_free(void*);
 
 static void* count(void* block) {
   g_allocations.fetch_add(1, std::memory_order_relaxed);
-  if (block != nullptr) g_held_bytes.fetch_add(static_cast<int64_t>(malloc_usable_size(block)), std::memory_order_relaxed);
+  if (block != nullptr)
+    g_held_bytes.fetch_add(static_cast<int64_t>(malloc_usable_size(block)),
+                           std::memory_order_relaxed);
   return block;
 }
 static void uncount(void* block) {
-  if (block != nullptr) g_held_bytes.fetch_sub(static_cast<int64_t>(malloc_usable_size(block)), std::memory_order_relaxed);
+  if (block != nullptr)
+    g_held_bytes.fetch_sub(static_cast<int64_t>(malloc_usable_size(block)),
+                           std::memory_order_relaxed);
 }
 void* malloc(size_t size) { return count(__libc_malloc(size)); }
 void* calloc(size_t n, size_t size) { return count(__libc_calloc(n, size)); }
@@ -49,7 +53,9 @@ void* realloc(void* block, size_t size) {
   return count(__libc_realloc(block, size));
 }
 void* memalign(size_t alignment, size_t size) { return count(__libc_memalign(alignment, size)); }
-void* aligned_alloc(size_t alignment, size_t size) { return count(__libc_memalign(alignment, size)); }
+void* aligned_alloc(size_t alignment, size_t size) {
+  return count(__libc_memalign(alignment, size));
+}
 int posix_memalign(void** block, size_t alignment, size_t size) {
   *block = count(__libc_memalign(alignment, size));
   return *block == nullptr ? ENOMEM : 0;
@@ -80,9 +86,11 @@ TEST(Allocation, TheCounterSeesNewAndMalloc) {
 void expect_no_allocations(uint32_t threads, Held held) {
   const SyntheticBody body = make_test_body({.uv_size = 32});
   const SyntheticAvatar avatar = make_test_avatar(body, {.held = held}),
-                        other = make_test_avatar(body, {.sh_degree = 2, .seed = 3, .held = Held::kFixedPoint});
+                        other = make_test_avatar(
+                            body, {.sh_degree = 2, .seed = 3, .held = Held::kFixedPoint});
   const std::unique_ptr<Renderer> renderer = make_renderer(threads);
-  const Result<AvatarId> a = renderer->add_avatar(*avatar.package, *body.package), b = renderer->add_avatar(*other.package, *body.package);
+  const Result<AvatarId> a = renderer->add_avatar(*avatar.package, *body.package),
+                         b = renderer->add_avatar(*other.package, *body.package);
   ASSERT_TRUE(a.ok() && b.ok());
   const Scene scene = make_random_scene(5000, 1, 4);
   const GaussianView view = scene.view();
@@ -98,12 +106,15 @@ void expect_no_allocations(uint32_t threads, Held held) {
   std::vector<uint8_t> rgba(200 * 160 * 4);
   uint64_t after_first = 0, first_pairs = 0, largest_pairs = 0;
   for (uint32_t frame = 0; frame < 12; ++frame) {
-    const FrameAvatar seen[] = {{.avatar = *a, .pose = poses[frame].view()}, {.avatar = *b, .pose = poses[11 - frame].view()}};
-    ASSERT_TRUE(
-        renderer->render({.camera = cameras[frame], .avatars = seen, .gaussians = {&view, 1}}, {.pixels = rgba.data(), .stride_bytes = 800})
-            .ok());
+    const FrameAvatar seen[] = {{.avatar = *a, .pose = poses[frame].view()},
+                                {.avatar = *b, .pose = poses[11 - frame].view()}};
+    ASSERT_TRUE(renderer
+                    ->render({.camera = cameras[frame], .avatars = seen, .gaussians = {&view, 1}},
+                             {.pixels = rgba.data(), .stride_bytes = 800})
+                    .ok());
     if (frame == 0) after_first = g_allocations;
-    (frame == 0 ? first_pairs : largest_pairs) = std::max(largest_pairs, renderer->statistics().pairs);
+    (frame == 0 ? first_pairs : largest_pairs) =
+        std::max(largest_pairs, renderer->statistics().pairs);
   }
   EXPECT_EQ(g_allocations - after_first, 0u) << threads << " threads";
   EXPECT_GT(largest_pairs, first_pairs);
@@ -118,7 +129,8 @@ TEST(Allocation, NoFrameAllocatesAfterTheFirst) {
 
 void expect_memory_is_what_was_taken(Held held) {
   const SyntheticBody body = make_test_body({.uv_size = 128});
-  const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 32, .fourier_octaves = 5, .held = held});
+  const SyntheticAvatar avatar =
+      make_test_avatar(body, {.channels = 32, .fourier_octaves = 5, .held = held});
   const SyntheticPose pose = make_test_pose(body.body(), 1);
   std::vector<uint8_t> rgba(512 * 512 * 4);
   {
@@ -129,9 +141,12 @@ void expect_memory_is_what_was_taken(Held held) {
   const Result<AvatarId> id = renderer->add_avatar(*avatar.package, *body.package);
   ASSERT_TRUE(id.ok());
   const FrameAvatar seen[] = {{.avatar = *id, .pose = pose.view()}};
-  ASSERT_TRUE(
-      renderer->render({.camera = make_test_camera(512, 512), .avatars = seen}, {.pixels = rgba.data(), .stride_bytes = 2048}).ok());
-  const double taken = static_cast<double>(g_held_bytes - before), said = static_cast<double>(renderer->memory_bytes());
+  ASSERT_TRUE(renderer
+                  ->render({.camera = make_test_camera(512, 512), .avatars = seen},
+                           {.pixels = rgba.data(), .stride_bytes = 2048})
+                  .ok());
+  const double taken = static_cast<double>(g_held_bytes - before),
+               said = static_cast<double>(renderer->memory_bytes());
   std::printf("edge-sized renderer: says %.2f MB, holds %.2f MB\n", said * 1e-6, taken * 1e-6);
   EXPECT_NEAR(said / taken, 1, 0.2);
 }

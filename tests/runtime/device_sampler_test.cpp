@@ -1,5 +1,6 @@
-// The device's sampler, part by part and whole: exact integer products, the transformer against its equations in double, weights, seeds,
-// blends of two seeds, the trace, and the bits that every CPU must have.
+// The device's sampler, part by part and whole: exact integer products, the transformer against its
+// equations in double, weights, seeds, blends of two seeds, the trace, and the bits that every CPU
+// must have.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +22,8 @@ namespace {
 
 using tests::RandomSampler;
 
-// ---- Integer products ------------------------------------------------------------------------------------------------------------------
+// ---- Integer products
+// ------------------------------------------------------------------------------------------------------------------
 
 std::vector<float> normal(uint64_t stream, size_t count) {
   std::vector<float> values(count);
@@ -35,31 +37,37 @@ TEST(IntegerLinear, StepsAreAsLargeAsNoSumOverflows) {
     const int64_t step = largest_step(columns);
     EXPECT_LE(127 * step * int64_t(columns), std::numeric_limits<int32_t>::max()) << columns;
     if (step < 32767) {
-      EXPECT_GT(127 * (step + 1) * int64_t(columns), std::numeric_limits<int32_t>::max()) << columns;
+      EXPECT_GT(127 * (step + 1) * int64_t(columns), std::numeric_limits<int32_t>::max())
+          << columns;
     }
   }
-  EXPECT_GE(largest_step(kMaxDenoiserWidth), 4096);  // 12 bits at the widest that a package may have
+  EXPECT_GE(largest_step(kMaxDenoiserWidth),
+            4096);  // 12 bits at the widest that a package may have
 }
 
 // Largest difference to the product in double, in units of the rounding that the header states.
 TEST(IntegerLinear, IsTheProductButForTheRoundingOfItsInput) {
-  for (const auto& [rows, columns, outputs] :
-       std::vector<std::array<size_t, 3>>{{1, 1, 1}, {3, 7, 5}, {4, 8, 4}, {17, 256, 33}, {5, 1023, 9}, {2, 4096, 3}}) {
-    const std::vector<float> x = normal(rows * columns, rows * columns), scales = normal(5, outputs), bias = normal(6, outputs);
+  for (const auto& [rows, columns, outputs] : std::vector<std::array<size_t, 3>>{
+           {1, 1, 1}, {3, 7, 5}, {4, 8, 4}, {17, 256, 33}, {5, 1023, 9}, {2, 4096, 3}}) {
+    const std::vector<float> x = normal(rows * columns, rows * columns),
+                             scales = normal(5, outputs), bias = normal(6, outputs);
     std::vector<float> row_scale;
     for (const float scale : scales) row_scale.push_back(1e-3f + std::fabs(scale));
     std::vector<int8_t> matrix(outputs * columns);
-    for (size_t k = 0; k < matrix.size(); ++k) matrix[k] = static_cast<int8_t>(static_cast<int>(k * 73 % 255) - 127);
+    for (size_t k = 0; k < matrix.size(); ++k)
+      matrix[k] = static_cast<int8_t>(static_cast<int>(k * 73 % 255) - 127);
     RoundedRows rounded;
     ASSERT_TRUE(rounded.ensure(rows, columns));
     rounded.round(x.data(), rows, columns, columns);
     std::vector<float> y(rows * outputs);
     std::vector<int16_t> storage(rounded.length() + 8);
-    auto* aligned = reinterpret_cast<int16_t*>((reinterpret_cast<uintptr_t>(storage.data()) + 15) / 16 * 16);
+    auto* aligned =
+        reinterpret_cast<int16_t*>((reinterpret_cast<uintptr_t>(storage.data()) + 15) / 16 * 16);
     multiply({matrix, row_scale, bias}, rounded, {aligned, rounded.length()}, y.data(), outputs);
     for (size_t m = 0; m < rows; ++m) {
       float largest = 0;
-      for (size_t k = 0; k < columns; ++k) largest = std::max(largest, std::fabs(x[m * columns + k]));
+      for (size_t k = 0; k < columns; ++k)
+        largest = std::max(largest, std::fabs(x[m * columns + k]));
       for (size_t n = 0; n < outputs; ++n) {
         double sum = 0, magnitudes = 0;
         for (size_t k = 0; k < columns; ++k) {
@@ -68,8 +76,10 @@ TEST(IntegerLinear, IsTheProductButForTheRoundingOfItsInput) {
         }
         const double truth = sum * row_scale[n] + bias[n];
         const double step = double(largest) / largest_step(columns);
-        const double bound = (0.51 * step * magnitudes + 1e-6 * std::fabs(sum)) * row_scale[n] + 1e-6;
-        EXPECT_NEAR(y[m * outputs + n], truth, bound) << rows << "x" << columns << " to " << outputs;
+        const double bound =
+            (0.51 * step * magnitudes + 1e-6 * std::fabs(sum)) * row_scale[n] + 1e-6;
+        EXPECT_NEAR(y[m * outputs + n], truth, bound)
+            << rows << "x" << columns << " to " << outputs;
       }
     }
   }
@@ -89,7 +99,8 @@ TEST(IntegerLinear, TheLargestSumsAreExact) {
 }
 
 TEST(IntegerLinear, RowsOfZerosAndOfTinyValuesAreZero) {
-  const std::vector<float> x = {0, 0, 0, 1e-35f, -1e-36f, 0, std::numeric_limits<float>::denorm_min(), 0, 0};
+  const std::vector<float> x = {
+      0, 0, 0, 1e-35f, -1e-36f, 0, std::numeric_limits<float>::denorm_min(), 0, 0};
   const std::vector<float> row_scale(1, 1.0f), bias(1, 0.25f);
   const std::vector<int8_t> matrix = {127, -127, 1};
   RoundedRows rounded;
@@ -101,9 +112,11 @@ TEST(IntegerLinear, RowsOfZerosAndOfTinyValuesAreZero) {
   for (const float value : y) EXPECT_EQ(value, 0.25f);
 }
 
-// ---- The transformer -------------------------------------------------------------------------------------------------------------------
+// ---- The transformer
+// -------------------------------------------------------------------------------------------------------------------
 
-// The equations of toolchain/generate/transformer.h in double, with the package's integers as real matrices.
+// The equations of toolchain/generate/transformer.h in double, with the package's integers as real
+// matrices.
 class TransformerInDouble {
  public:
   explicit TransformerInDouble(const Sampler& sampler) : s_(sampler), d_(sampler.denoiser.d_model) {
@@ -128,7 +141,8 @@ class TransformerInDouble {
     t.push_back(linear(s_.ranks.size() + 1, hidden));
     size_t at = 0;
     for (size_t l = 0; l < s_.ranks.size(); at += s_.ranks[l++]) {
-      t.push_back(linear(l, std::vector<double>(z.begin() + ptrdiff_t(at), z.begin() + ptrdiff_t(at + s_.ranks[l]))));
+      t.push_back(linear(l, std::vector<double>(z.begin() + ptrdiff_t(at),
+                                                z.begin() + ptrdiff_t(at + s_.ranks[l]))));
     }
     for (size_t i = 0; i < tokens; ++i) {
       for (size_t k = 0; k < d_; ++k) t[i][k] += s_.position[i * d_ + k];
@@ -147,7 +161,8 @@ class TransformerInDouble {
     }
     std::vector<double> out;
     for (size_t l = 0; l < s_.ranks.size(); ++l) {
-      const std::vector<double> values = linear(matrix + l, norm(2 * size_t{s_.denoiser.blocks}, t[l + 1]));
+      const std::vector<double> values =
+          linear(matrix + l, norm(2 * size_t{s_.denoiser.blocks}, t[l + 1]));
       out.insert(out.end(), values.begin(), values.end());
     }
     return out;
@@ -162,7 +177,8 @@ class TransformerInDouble {
     const auto [rows, columns] = shapes_[matrix];
     std::vector<double> y(rows);
     for (size_t n = 0; n < rows; ++n) {
-      for (size_t k = 0; k < columns; ++k) y[n] += double(s_.matrices[begin_[matrix] + n * columns + k]) * x[k];
+      for (size_t k = 0; k < columns; ++k)
+        y[n] += double(s_.matrices[begin_[matrix] + n * columns + k]) * x[k];
       y[n] = y[n] * s_.row_scale[row_begin_[matrix] + n] + s_.bias[row_begin_[matrix] + n];
     }
     return y;
@@ -174,7 +190,8 @@ class TransformerInDouble {
     for (const double value : x) variance += (value - mean) * (value - mean) / double(d_);
     std::vector<double> y(d_);
     const float* weight = s_.norm.data() + which * 2 * d_;
-    for (size_t k = 0; k < d_; ++k) y[k] = (x[k] - mean) / std::sqrt(variance + 1e-5) * weight[k] + weight[d_ + k];
+    for (size_t k = 0; k < d_; ++k)
+      y[k] = (x[k] - mean) / std::sqrt(variance + 1e-5) * weight[k] + weight[d_ + k];
     return y;
   }
 
@@ -187,11 +204,13 @@ class TransformerInDouble {
         double sum = 0;
         for (size_t j = 0; j < qkv.size(); ++j) {
           double score = 0;
-          for (size_t c = 0; c < size; ++c) score += qkv[i][h * size + c] * qkv[j][d_ + h * size + c];
+          for (size_t c = 0; c < size; ++c)
+            score += qkv[i][h * size + c] * qkv[j][d_ + h * size + c];
           sum += weight[j] = std::exp(score / std::sqrt(double(size)));
         }
         for (size_t j = 0; j < qkv.size(); ++j) {
-          for (size_t c = 0; c < size; ++c) out[i][h * size + c] += weight[j] / sum * qkv[j][2 * d_ + h * size + c];
+          for (size_t c = 0; c < size; ++c)
+            out[i][h * size + c] += weight[j] / sum * qkv[j][2 * d_ + h * size + c];
         }
       }
     }
@@ -206,8 +225,12 @@ class TransformerInDouble {
 
 TEST(DeviceTransformer, IsItsEquationsButForTheRoundingOfActivations) {
   tests::RandomSamplerShape shapes[3];
-  shapes[1] = {.rank = 1, .shape_count = 0, .denoiser = {.d_model = 8, .blocks = 1, .heads = 1, .feed_forward = 3}};
-  shapes[2] = {.rank = 13, .denoiser = {.d_model = 96, .blocks = 4, .heads = 16, .feed_forward = 200}, .contrast = 2};
+  shapes[1] = {.rank = 1,
+               .shape_count = 0,
+               .denoiser = {.d_model = 8, .blocks = 1, .heads = 1, .feed_forward = 3}};
+  shapes[2] = {.rank = 13,
+               .denoiser = {.d_model = 96, .blocks = 4, .heads = 16, .feed_forward = 200},
+               .contrast = 2};
   for (const tests::RandomSamplerShape& shape : shapes) {
     const RandomSampler sampler(shape);
     const auto transformer = DeviceTransformer::create(sampler.view);
@@ -224,7 +247,8 @@ TEST(DeviceTransformer, IsItsEquationsButForTheRoundingOfActivations) {
         error += (x0[k] - truth[k]) * (x0[k] - truth[k]);
         power += truth[k] * truth[k];
       }
-      std::printf("  d %u, lambda %g: relative error %.2g\n", shape.denoiser.d_model, lambda, std::sqrt(error / power));
+      std::printf("  d %u, lambda %g: relative error %.2g\n", shape.denoiser.d_model, lambda,
+                  std::sqrt(error / power));
       EXPECT_LT(std::sqrt(error / power), 5e-4);
     }
   }
@@ -242,7 +266,8 @@ TEST(DeviceTransformer, HoldsItsValuesWhereInputsAreExtreme) {
   }
 }
 
-// ---- Weights ---------------------------------------------------------------------------------------------------------------------------
+// ---- Weights
+// ---------------------------------------------------------------------------------------------------------------------------
 
 TEST(WeightDecoder, IsTheStatedArithmetic) {
   const RandomSampler sampler;
@@ -256,7 +281,8 @@ TEST(WeightDecoder, IsTheStatedArithmetic) {
     for (const size_t j : {size_t{0}, sizes[l] / 2, sizes[l] - 1}) {
       double truth = view.mean[begin + j];
       for (uint32_t k = 0; k < view.ranks[l]; ++k) {
-        truth += double(from[value + k]) * view.direction_scale[value + k] * view.directions[direction + k * sizes[l] + j];
+        truth += double(from[value + k]) * view.direction_scale[value + k] *
+                 view.directions[direction + k * sizes[l] + j];
       }
       EXPECT_NEAR(weights[begin + j], truth, 1e-6) << "token " << l << ", value " << j;
     }
@@ -264,7 +290,8 @@ TEST(WeightDecoder, IsTheStatedArithmetic) {
   }
 }
 
-// ---- Seeds -----------------------------------------------------------------------------------------------------------------------------
+// ---- Seeds
+// -----------------------------------------------------------------------------------------------------------------------------
 
 std::vector<float> weights_of(const SampledAvatar& sampled) {
   std::vector<float> weights;
@@ -315,7 +342,8 @@ TEST_F(AvatarSamplerTest, ASeedIsOneAvatarAndAnotherIsAnother) {
 }
 
 TEST_F(AvatarSamplerTest, ZeroStepsAndNoMethodAreThePackages) {
-  EXPECT_EQ(hash_of({.seed = 1}), hash_of({.seed = 1, .steps = 20, .method = SolverMethod::kDpmSolverPlusPlus2M}));
+  EXPECT_EQ(hash_of({.seed = 1}),
+            hash_of({.seed = 1, .steps = 20, .method = SolverMethod::kDpmSolverPlusPlus2M}));
 }
 
 TEST_F(AvatarSamplerTest, BlendsBeginAndEndAtTheSeeds) {
@@ -332,15 +360,19 @@ TEST_F(AvatarSamplerTest, BlendsAreContinuous) {
   ASSERT_TRUE(sampler_->sample({.seed = 1, .to = 2, .mix = 0.5001}, b).ok());
   const std::vector<float> first = weights_of(a), second = weights_of(b);
   float largest = 0;
-  for (size_t k = 0; k < first.size(); ++k) largest = std::max(largest, std::fabs(first[k] - second[k]));
+  for (size_t k = 0; k < first.size(); ++k)
+    largest = std::max(largest, std::fabs(first[k] - second[k]));
   EXPECT_LT(largest, 0.02f);
 }
 
 TEST_F(AvatarSamplerTest, RefusesWhatIsOutOfRange) {
   SampledAvatar person;
-  EXPECT_EQ(sampler_->sample({.seed = 1, .steps = 1001}, person).code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(sampler_->sample({.seed = 1, .steps = 1001}, person).code(),
+            StatusCode::kInvalidArgument);
   for (const double mix : {-0.1, 1.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
-    EXPECT_EQ(sampler_->sample({.seed = 1, .mix = mix}, person).code(), StatusCode::kInvalidArgument) << mix;
+    EXPECT_EQ(sampler_->sample({.seed = 1, .mix = mix}, person).code(),
+              StatusCode::kInvalidArgument)
+        << mix;
   }
 }
 
@@ -348,7 +380,8 @@ TEST_F(AvatarSamplerTest, EveryNumberOfStepsIsFinite) {
   SampledAvatar person;
   for (const uint32_t steps : {1u, 2u, 3u, 5u, 50u, 250u}) {
     for (const SolverMethod method : {SolverMethod::kDdim, SolverMethod::kDpmSolverPlusPlus2M}) {
-      ASSERT_TRUE(sampler_->sample({.seed = 4, .steps = steps, .method = method}, person).ok()) << steps;
+      ASSERT_TRUE(sampler_->sample({.seed = 4, .steps = steps, .method = method}, person).ok())
+          << steps;
     }
   }
 }
@@ -387,7 +420,8 @@ TEST_F(AvatarSamplerTest, TheTraceSeesEveryStepAndChangesNothing) {
   Counted trace;
   ASSERT_TRUE(sampler_->sample({.seed = 1, .steps = 6}, person, &trace).ok());
   EXPECT_EQ(trace.steps(), 6u);
-  EXPECT_EQ(hash_weights(person.avatar().fixed_point, person.avatar().shape), hash_of({.seed = 1, .steps = 6}));
+  EXPECT_EQ(hash_weights(person.avatar().fixed_point, person.avatar().shape),
+            hash_of({.seed = 1, .steps = 6}));
 }
 
 TEST_F(AvatarSamplerTest, AnErrorOfTheTraceEndsTheSampling) {
@@ -400,10 +434,12 @@ TEST_F(AvatarSamplerTest, AnErrorOfTheTraceEndsTheSampling) {
   }
 }
 
-// Found on x86-64 with AMX; the same under every CPU that the tests run on (scripts/test: the host, aarch64 A76 and A53).
+// Found on x86-64 with AMX; the same under every CPU that the tests run on (scripts/test: the host,
+// aarch64 A76 and A53).
 TEST_F(AvatarSamplerTest, EveryCpuHasTheseBits) {
   EXPECT_EQ(format_hash(hash_of({.seed = 1})), "67c003fb1c5a66be22aaad30e5dffc45");
-  EXPECT_EQ(format_hash(hash_of({.seed = 1, .to = 2, .mix = 0.25, .steps = 50, .method = SolverMethod::kDdim})),
+  EXPECT_EQ(format_hash(hash_of(
+                {.seed = 1, .to = 2, .mix = 0.25, .steps = 50, .method = SolverMethod::kDdim})),
             "12801b0702f0cb18a318ea45195af522");
 }
 

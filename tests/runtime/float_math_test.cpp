@@ -1,4 +1,5 @@
-// The runtime's own exp, exp2, log2, erf and logistic against double libm, over dense samples of the floats of their domains.
+// The runtime's own exp, exp2, log2, erf and logistic against double libm, over dense samples of
+// the floats of their domains.
 #include "runtime/src/float_math.h"
 
 #include <gtest/gtest.h>
@@ -9,12 +10,14 @@
 namespace figurine {
 namespace {
 
-// Every stride-th float of [low, high], by bits; both ends of one sign. The stride is a prime, so that no mantissa pattern is favoured.
+// Every stride-th float of [low, high], by bits; both ends of one sign. The stride is a prime, so
+// that no mantissa pattern is favoured.
 template <class Visit>
 void for_each_float(float low, float high, uint32_t stride, const Visit& visit) {
   const uint32_t first = std::bit_cast<uint32_t>(std::fabs(low) < std::fabs(high) ? low : high);
   const uint32_t last = std::bit_cast<uint32_t>(std::fabs(low) < std::fabs(high) ? high : low);
-  for (uint64_t bits = first; bits <= last; bits += stride) visit(std::bit_cast<float>(static_cast<uint32_t>(bits)));
+  for (uint64_t bits = first; bits <= last; bits += stride)
+    visit(std::bit_cast<float>(static_cast<uint32_t>(bits)));
   visit(std::bit_cast<float>(last));
 }
 
@@ -88,7 +91,8 @@ TEST(FloatMath, LogisticIsWithinTwoUlpAndSaturates) {
   };
   for_each_float(-80.0f, -1e-6f, 1009, add);
   for_each_float(1e-6f, 80.0f, 1009, add);
-  std::printf("largest relative error of the logistic function: %.3g at %.9g\n", worst.error, worst.at);
+  std::printf("largest relative error of the logistic function: %.3g at %.9g\n", worst.error,
+              worst.at);
   EXPECT_LE(worst.error, 2.4e-7);
   EXPECT_EQ(logistic(INFINITY), 1.0f);
   EXPECT_EQ(logistic(-INFINITY), 0.0f);
@@ -104,7 +108,8 @@ TEST(FloatMath, Log2ErrorIsWithinItsStatement) {
     worst.add((log2_float(x) - truth) / (2e-7 + 1.2e-7 * std::fabs(truth)), x);
   };
   for_each_float(0x1p-126f, 3e38f, 1009, add);
-  std::printf("largest error of log2 as a part of its bound: %.3g at %.9g\n", worst.error, worst.at);
+  std::printf("largest error of log2 as a part of its bound: %.3g at %.9g\n", worst.error,
+              worst.at);
   EXPECT_LE(worst.error, 1);
   EXPECT_EQ(log2_float(1.0f), 0.0f);
   EXPECT_EQ(log2_float(8.0f), 3.0f);

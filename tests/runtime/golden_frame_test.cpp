@@ -1,9 +1,10 @@
-// Everything of a frame around the network, equal to the bit on every CPU, compiler setting and number of threads: posed maps, decoding,
-// skinning, projection, sort, blend. One golden number a stage, in tests/golden/frame/posed_bodies.json: the first one to differ names the
-// culprit.
+// Everything of a frame around the network, equal to the bit on every CPU, compiler setting and
+// number of threads: posed maps, decoding, skinning, projection, sort, blend. One golden number a
+// stage, in tests/golden/frame/posed_bodies.json: the first one to differ names the culprit.
 //
-// XNNPACK's float networks differ in the last bits from CPU to CPU. The network here does not: each of its outputs is a bias plus one input
-// times a power of two, a single rounding however it is summed. No libm makes any of the input, but for the test body's sines in double.
+// XNNPACK's float networks differ in the last bits from CPU to CPU. The network here does not: each
+// of its outputs is a bias plus one input times a power of two, a single rounding however it is
+// summed. No libm makes any of the input, but for the test body's sines in double.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -26,12 +27,14 @@ using tests::SyntheticPose;
 
 constexpr uint32_t kShDegree = 1;  // of the avatar; the static Gaussians have degree 3
 
-// FNV-1a, 64 bits (Fowler, Noll, Vo), over the values' bytes, which are little-endian wherever figurine runs.
+// FNV-1a, 64 bits (Fowler, Noll, Vo), over the values' bytes, which are little-endian wherever
+// figurine runs.
 class Hash {
  public:
   template <class T>
   Hash& add(std::span<const T> values) {
-    for (const std::byte byte : std::as_bytes(values)) state_ = (state_ ^ std::to_integer<uint64_t>(byte)) * 0x100000001b3u;
+    for (const std::byte byte : std::as_bytes(values))
+      state_ = (state_ ^ std::to_integer<uint64_t>(byte)) * 0x100000001b3u;
     return *this;
   }
   std::string hex() const {
@@ -45,7 +48,8 @@ class Hash {
 };
 
 void expect_golden(const std::string& stage, const Hash& hash) {
-  static const nlohmann::json golden = nlohmann::json::parse(std::ifstream(FIGURINE_SOURCE_DIR "/tests/golden/frame/posed_bodies.json"));
+  static const nlohmann::json golden = nlohmann::json::parse(
+      std::ifstream(FIGURINE_SOURCE_DIR "/tests/golden/frame/posed_bodies.json"));
   std::printf("golden frame: %s %s\n", stage.c_str(), hash.hex().c_str());
   EXPECT_EQ(golden.at(stage), hash.hex()) << stage;
 }
@@ -56,7 +60,8 @@ std::unique_ptr<Package> make_exact_avatar(const SyntheticBody& body, tests::Ali
   tests::Random random(3);
   std::vector<float> weights(size_t{kOutputs} * kMapChannels), bias(kOutputs);
   for (uint32_t o = 0; o < kOutputs; ++o) {
-    weights[o * kMapChannels + o % kMapChannels] = (o % 2 == 0 ? 1.0f : -1.0f) / static_cast<float>(2u << o % 3);
+    weights[o * kMapChannels + o % kMapChannels] =
+        (o % 2 == 0 ? 1.0f : -1.0f) / static_cast<float>(2u << o % 3);
     bias[o] = random.uniform(-0.5f, 0.5f);
   }
   const std::vector<float> shape = {0.5f, -0.5f};
@@ -68,14 +73,16 @@ std::unique_ptr<Package> make_exact_avatar(const SyntheticBody& body, tests::Ali
   avatar.preset = "test";
   avatar.shape = shape;
   avatar.decoding.sh_degree = kShDegree;
-  avatar.network = {.input_size = body.body().uv_size,
-                    .input_channels = kMapChannels,
-                    .layers = {{.out_channels = kOutputs, .kernel = 1, .weights = weights, .bias = bias}}};
+  avatar.network = {
+      .input_size = body.body().uv_size,
+      .input_channels = kMapChannels,
+      .layers = {{.out_channels = kOutputs, .kernel = 1, .weights = weights, .bias = bias}}};
   avatar.golden.rotations = rest.rotations;
   avatar.golden.camera = tests::front_camera(64, 64, 64);
-  const Budget budget{.peak_memory_bytes = 64 << 20,
-                      .macs_per_frame = count_macs(avatar.network, *infer_shapes(avatar.network, true)),
-                      .gaussians = body.body().texel_count()};
+  const Budget budget{
+      .peak_memory_bytes = 64 << 20,
+      .macs_per_frame = count_macs(avatar.network, *infer_shapes(avatar.network, true)),
+      .gaussians = body.body().texel_count()};
   const Result<std::vector<std::byte>> written =
       write_package(avatar, budget, {.tool = "figurine-tests 1", .depicted_person = "synthetic"});
   FIG_CHECK(written.ok(), written.status().message().c_str());
@@ -90,8 +97,10 @@ Scene make_cloud(uint32_t count) {
   tests::Random random(4);
   Scene scene{.sh_degree = 3};
   for (uint32_t i = 0; i < count; ++i) {
-    const std::array<float, 3> place{random.uniform(-1.2f, 1.2f), random.uniform(-0.2f, 1.8f), random.uniform(-1.5f, 2)};
-    const float quaternion[4] = {random.normal(), random.normal(), random.normal(), random.normal()};
+    const std::array<float, 3> place{random.uniform(-1.2f, 1.2f), random.uniform(-0.2f, 1.8f),
+                                     random.uniform(-1.5f, 2)};
+    const float quaternion[4] = {random.normal(), random.normal(), random.normal(),
+                                 random.normal()};
     std::array<float, 9> factor = rotation_from_quaternion(quaternion);
     for (int k = 0; k < 3; ++k) {
       const float root = random.uniform(0.03f, 0.45f), scale = root * root;
@@ -104,7 +113,8 @@ Scene make_cloud(uint32_t count) {
   return scene;
 }
 
-// From the front and a little to the side: a rotation about y by the triangle of sides 7, 24, 25, in axes with y down and z forward.
+// From the front and a little to the side: a rotation about y by the triangle of sides 7, 24, 25,
+// in axes with y down and z forward.
 Camera make_camera() {
   Camera camera = tests::front_camera(160, 120, 130);
   camera.view_from_world = {0.96f, 0, -0.28f, 0.05f, 0, -1, 0, 0.8f, -0.28f, 0, -0.96f, 2.5f};
@@ -115,7 +125,8 @@ struct GoldenScene {
   SyntheticBody body = tests::make_test_body({.uv_size = 32, .joints = 5});
   tests::AlignedBytes avatar_bytes;
   std::unique_ptr<Package> avatar = make_exact_avatar(body, avatar_bytes);
-  SyntheticPose poses[2] = {tests::make_test_pose(body.body(), 2), tests::make_test_pose(body.body(), 4)};
+  SyntheticPose poses[2] = {tests::make_test_pose(body.body(), 2),
+                            tests::make_test_pose(body.body(), 4)};
   Scene cloud = make_cloud(400);
 };
 
@@ -133,7 +144,9 @@ TEST(GoldenFrame, InputIsTheSameEverywhere) {
   const Layer& layer = scene.avatar->avatar().network.layers[0];
   expect_golden("network", Hash().add(layer.weights).add(layer.bias));
   const GaussianView cloud = scene.cloud.view();
-  expect_golden("cloud", Hash().add(cloud.position_m).add(cloud.covariance_factor).add(cloud.opacity).add(cloud.sh));
+  expect_golden(
+      "cloud",
+      Hash().add(cloud.position_m).add(cloud.covariance_factor).add(cloud.opacity).add(cloud.sh));
 }
 
 TEST(GoldenFrame, PosedMapsAreTheSameEverywhere) {
@@ -174,15 +187,20 @@ TEST(GoldenFrame, PixelsAreTheSameEverywhere) {
     const std::unique_ptr<Renderer> renderer = tests::make_renderer(threads);
     const Result<AvatarId> id = renderer->add_avatar(*scene.avatar, *scene.body.package);
     ASSERT_TRUE(id.ok()) << id.status().message();
-    FrameAvatar seen[] = {{.avatar = *id, .pose = scene.poses[0].view()}, {.avatar = *id, .pose = scene.poses[1].view()}};
+    FrameAvatar seen[] = {{.avatar = *id, .pose = scene.poses[0].view()},
+                          {.avatar = *id, .pose = scene.poses[1].view()}};
     seen[1].pose.root_translation_m[0] += 0.5f;
     Frame frame{.camera = camera, .avatars = seen, .gaussians = {&cloud, 1}};
-    expect_golden("pixels_f32", Hash().add(std::span<const float>(tests::render(*renderer, frame).rgba)));
+    expect_golden("pixels_f32",
+                  Hash().add(std::span<const float>(tests::render(*renderer, frame).rgba)));
     EXPECT_GT(renderer->statistics().visible, 1000u) << "bodies and cloud must be in the picture";
 
     frame.background = {0.25f, 0.5f, 0.75f};
     std::vector<uint8_t> rgba(values);
-    ASSERT_TRUE(renderer->render(frame, {.pixels = rgba.data(), .stride_bytes = size_t{4} * camera.width_px}).ok());
+    ASSERT_TRUE(
+        renderer
+            ->render(frame, {.pixels = rgba.data(), .stride_bytes = size_t{4} * camera.width_px})
+            .ok());
     expect_golden("pixels_rgba8", Hash().add(std::span<const uint8_t>(rgba)));
   }
 }

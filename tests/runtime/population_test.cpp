@@ -1,4 +1,5 @@
-// A population's member through the renderer: the same picture, to the bit, as an avatar package that holds the same weights.
+// A population's member through the renderer: the same picture, to the bit, as an avatar package
+// that holds the same weights.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -27,15 +28,17 @@ std::vector<float> draw(const SyntheticBody& body, const std::vector<Avatar>& av
   const std::unique_ptr<Renderer> renderer = make_renderer();
   std::vector<FrameAvatar> seen;
   std::vector<SyntheticPose> poses;
-  for (size_t i = 0; i < avatars.size(); ++i) poses.push_back(make_test_pose(body.body(), static_cast<uint32_t>(i + 1)));
+  for (size_t i = 0; i < avatars.size(); ++i)
+    poses.push_back(make_test_pose(body.body(), static_cast<uint32_t>(i + 1)));
   for (size_t i = 0; i < avatars.size(); ++i) {
     const Result<AvatarId> id = renderer->add_avatar(avatars[i], *body.package);
     FIG_CHECK(id.ok(), id.status().message().c_str());
     seen.push_back({.avatar = *id, .pose = poses[i].view()});
   }
   std::vector<float> pixels(size_t{kWidth} * kHeight * 4, -1);
-  const Status status = renderer->render({.camera = make_test_camera(kWidth, kHeight), .avatars = seen},
-                                         {.pixels = pixels.data(), .stride_bytes = kWidth * 16, .format = PixelFormat::kRgbaF32});
+  const Status status = renderer->render(
+      {.camera = make_test_camera(kWidth, kHeight), .avatars = seen},
+      {.pixels = pixels.data(), .stride_bytes = kWidth * 16, .format = PixelFormat::kRgbaF32});
   EXPECT_TRUE(status.ok()) << status.message();
   return pixels;
 }
@@ -53,10 +56,13 @@ struct People {
   std::vector<std::vector<float>> storage;
 
   explicit People(DifferenceCoding coding) {
-    NewPopulation population{.name = "people", .initial = initial.package->avatar().network, .coding = coding};
+    NewPopulation population{
+        .name = "people", .initial = initial.package->avatar().network, .coding = coding};
     for (uint64_t seed = 1; seed <= 3; ++seed) {
-      avatars.push_back(make_test_avatar(body, {.seed = seed, .name = "person " + std::to_string(seed)}));
-      population.members.push_back({&avatars.back().package->avatar(), &avatars.back().package->provenance(), Split::kTrain});
+      avatars.push_back(
+          make_test_avatar(body, {.seed = seed, .name = "person " + std::to_string(seed)}));
+      population.members.push_back({&avatars.back().package->avatar(),
+                                    &avatars.back().package->provenance(), Split::kTrain});
     }
     for (size_t m = 0; m < 3; ++m) {  // the vector has grown
       population.members[m].avatar = &avatars[m].package->avatar();
@@ -81,7 +87,8 @@ TEST(PopulationMember, RendersWhatAnAvatarPackageOfTheSameWeightsRenders) {
     People people(coding);
     for (size_t m = 0; m < 3; ++m) {
       const Avatar member = people.member(m);
-      const Result<std::vector<std::byte>> written = write_package(member, people.package->budget(), people.package->member_provenance(m));
+      const Result<std::vector<std::byte>> written =
+          write_package(member, people.package->budget(), people.package->member_provenance(m));
       ASSERT_TRUE(written.ok()) << written.status().message();
       const tests::AlignedBytes bytes(*written);
       const Result<Package> alone = Package::open(bytes.bytes(), "alone");
@@ -102,16 +109,20 @@ TEST(PopulationMember, SeveralStandInOneFrame) {
 TEST(PopulationMember, IsInFloatAlone) {
   People people(DifferenceCoding::kInt8);
   const std::unique_ptr<Renderer> renderer = make_renderer();
-  const Status status = renderer->add_avatar(people.member(0), *people.body.package, Precision::kFixedPoint).status();
+  const Status status =
+      renderer->add_avatar(people.member(0), *people.body.package, Precision::kFixedPoint).status();
   EXPECT_EQ(status.code(), StatusCode::kUnsupported);
-  EXPECT_NE(status.message().find("in f32 alone, not in q8"), std::string::npos) << status.message();
+  EXPECT_NE(status.message().find("in f32 alone, not in q8"), std::string::npos)
+      << status.message();
 }
 
 TEST(PopulationMember, NeedsItsBody) {
   People people(DifferenceCoding::kInt8);
   const SyntheticBody other = make_test_body({.seed = 2});
-  EXPECT_EQ(make_renderer()->add_avatar(people.member(0), *other.package).status().code(), StatusCode::kMismatch);
-  EXPECT_EQ(make_renderer()->add_avatar(*people.package, *people.body.package).status().code(), StatusCode::kMismatch);
+  EXPECT_EQ(make_renderer()->add_avatar(people.member(0), *other.package).status().code(),
+            StatusCode::kMismatch);
+  EXPECT_EQ(make_renderer()->add_avatar(*people.package, *people.body.package).status().code(),
+            StatusCode::kMismatch);
 }
 
 }  // namespace

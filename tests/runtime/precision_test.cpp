@@ -1,4 +1,5 @@
-// Avatars in fixed point through the renderer: which precision runs, what is refused, and frames that are the same bytes everywhere.
+// Avatars in fixed point through the renderer: which precision runs, what is refused, and frames
+// that are the same bytes everywhere.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -26,17 +27,19 @@ struct Drawn {
   std::vector<uint8_t> rgba;
 };
 
-Drawn draw(const SyntheticBody& body, const SyntheticAvatar& avatar, uint32_t frame, std::optional<Precision> precision,
-           uint32_t threads = 1) {
+Drawn draw(const SyntheticBody& body, const SyntheticAvatar& avatar, uint32_t frame,
+           std::optional<Precision> precision, uint32_t threads = 1) {
   const std::unique_ptr<Renderer> renderer = make_renderer(threads);
   const Result<AvatarId> id = renderer->add_avatar(*avatar.package, *body.package, precision);
   FIG_CHECK(id.ok(), id.status().message().c_str());
   const SyntheticPose pose = make_test_pose(body.body(), frame);
   const FrameAvatar seen[] = {{.avatar = *id, .pose = pose.view()}};
-  Drawn drawn{.precision = renderer->precision(*id), .rgba = std::vector<uint8_t>(200 * 150 * 4, 77)};
-  const Status status =
-      renderer->render({.camera = make_test_camera(200, 150), .avatars = seen, .background = std::array{0.5f, 0.5f, 0.5f}},
-                       {.pixels = drawn.rgba.data(), .stride_bytes = 800});
+  Drawn drawn{.precision = renderer->precision(*id),
+              .rgba = std::vector<uint8_t>(200 * 150 * 4, 77)};
+  const Status status = renderer->render({.camera = make_test_camera(200, 150),
+                                          .avatars = seen,
+                                          .background = std::array{0.5f, 0.5f, 0.5f}},
+                                         {.pixels = drawn.rgba.data(), .stride_bytes = 800});
   EXPECT_TRUE(status.ok()) << status.message();
   return drawn;
 }
@@ -56,8 +59,10 @@ double psnr_db(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
 
 TEST(PrecisionOfARenderer, IsFixedPointWhereTheAvatarHasIt) {
   const SyntheticBody body = make_test_body();
-  EXPECT_EQ(draw(body, make_test_avatar(body, {.held = Held::kFloat32}), 1, {}).precision, Precision::kFloat32);
-  EXPECT_EQ(draw(body, make_test_avatar(body, {.held = Held::kFixedPoint}), 1, {}).precision, Precision::kFixedPoint);
+  EXPECT_EQ(draw(body, make_test_avatar(body, {.held = Held::kFloat32}), 1, {}).precision,
+            Precision::kFloat32);
+  EXPECT_EQ(draw(body, make_test_avatar(body, {.held = Held::kFixedPoint}), 1, {}).precision,
+            Precision::kFixedPoint);
   const SyntheticAvatar both = make_test_avatar(body, {.held = Held::kBoth});
   EXPECT_EQ(draw(body, both, 1, {}).precision, Precision::kFixedPoint);
   EXPECT_EQ(draw(body, both, 1, Precision::kFloat32).precision, Precision::kFloat32);
@@ -67,13 +72,18 @@ TEST(PrecisionOfARenderer, IsFixedPointWhereTheAvatarHasIt) {
 TEST(PrecisionOfARenderer, IsRefusedWhereTheAvatarLacksIt) {
   const SyntheticBody body = make_test_body();
   const std::unique_ptr<Renderer> renderer = make_renderer();
-  const SyntheticAvatar floats = make_test_avatar(body), fixed = make_test_avatar(body, {.held = Held::kFixedPoint});
-  const Status no_fixed = renderer->add_avatar(*floats.package, *body.package, Precision::kFixedPoint).status();
+  const SyntheticAvatar floats = make_test_avatar(body),
+                        fixed = make_test_avatar(body, {.held = Held::kFixedPoint});
+  const Status no_fixed =
+      renderer->add_avatar(*floats.package, *body.package, Precision::kFixedPoint).status();
   EXPECT_EQ(no_fixed.code(), StatusCode::kUnsupported);
-  EXPECT_NE(no_fixed.message().find("figurine-train pack --precision q8"), std::string::npos) << no_fixed.message();
-  const Status no_float = renderer->add_avatar(*fixed.package, *body.package, Precision::kFloat32).status();
+  EXPECT_NE(no_fixed.message().find("figurine-train pack --precision q8"), std::string::npos)
+      << no_fixed.message();
+  const Status no_float =
+      renderer->add_avatar(*fixed.package, *body.package, Precision::kFloat32).status();
   EXPECT_EQ(no_float.code(), StatusCode::kUnsupported);
-  EXPECT_NE(no_float.message().find("in q8 alone, not in f32"), std::string::npos) << no_float.message();
+  EXPECT_NE(no_float.message().find("in q8 alone, not in f32"), std::string::npos)
+      << no_float.message();
   EXPECT_EQ(no_float.message().find('\n'), std::string::npos);
 }
 
@@ -81,8 +91,10 @@ TEST(PrecisionOfARenderer, BothPrecisionsOfOneAvatarMayStandInAFrame) {
   const SyntheticBody body = make_test_body();
   const SyntheticAvatar avatar = make_test_avatar(body, {.held = Held::kBoth});
   const std::unique_ptr<Renderer> renderer = make_renderer();
-  const Result<AvatarId> fixed = renderer->add_avatar(*avatar.package, *body.package, Precision::kFixedPoint),
-                         floats = renderer->add_avatar(*avatar.package, *body.package, Precision::kFloat32);
+  const Result<AvatarId> fixed = renderer->add_avatar(*avatar.package, *body.package,
+                                                      Precision::kFixedPoint),
+                         floats = renderer->add_avatar(*avatar.package, *body.package,
+                                                       Precision::kFloat32);
   ASSERT_TRUE(fixed.ok() && floats.ok());
   const SyntheticPose pose = make_test_pose(body.body(), 2);
   std::vector<std::vector<float>> positions;
@@ -99,8 +111,8 @@ TEST(FixedPointFrame, IsCloseToTheFloatFrame) {
   const SyntheticBody body = make_test_body({.uv_size = 32});
   const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 8, .held = Held::kBoth});
   for (const uint32_t frame : {1u, 3u}) {
-    const double psnr =
-        psnr_db(draw(body, avatar, frame, Precision::kFixedPoint).rgba, draw(body, avatar, frame, Precision::kFloat32).rgba);
+    const double psnr = psnr_db(draw(body, avatar, frame, Precision::kFixedPoint).rgba,
+                                draw(body, avatar, frame, Precision::kFloat32).rgba);
     std::printf("frame %u: %.1f dB to the float frame\n", frame, psnr);
     EXPECT_GT(psnr, 50) << "a random network, calibrated by the range of one pose";
   }
@@ -108,15 +120,19 @@ TEST(FixedPointFrame, IsCloseToTheFloatFrame) {
 
 TEST(FixedPointFrame, TheSameBytesForAnyNumberOfThreads) {
   const SyntheticBody body = make_test_body({.uv_size = 64, .joints = 5});
-  const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 16, .fourier_octaves = 5, .held = Held::kFixedPoint});
+  const SyntheticAvatar avatar =
+      make_test_avatar(body, {.channels = 16, .fourier_octaves = 5, .held = Held::kFixedPoint});
   const std::vector<uint8_t> one = draw(body, avatar, 3, {}, 1).rgba;
-  for (const uint32_t threads : {2u, 3u}) EXPECT_TRUE(draw(body, avatar, 3, {}, threads).rgba == one) << threads << " threads";
+  for (const uint32_t threads : {2u, 3u})
+    EXPECT_TRUE(draw(body, avatar, 3, {}, threads).rgba == one) << threads << " threads";
 }
 
 TEST(FixedPointFrame, TheSameBytesOnEveryCpu) {
-  // Measured once; a CPU, a compiler or a version of XNNPACK that gives another number breaks the promise of golden hashes.
+  // Measured once; a CPU, a compiler or a version of XNNPACK that gives another number breaks the
+  // promise of golden hashes.
   const SyntheticBody body = make_test_body({.uv_size = 32, .joints = 5});
-  const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 8, .fourier_octaves = 3, .held = Held::kFixedPoint});
+  const SyntheticAvatar avatar =
+      make_test_avatar(body, {.channels = 8, .fourier_octaves = 3, .held = Held::kFixedPoint});
   EXPECT_EQ(hash(draw(body, avatar, 3, {}).rgba), 11694599759566206101u) << network_library();
 }
 

@@ -1,5 +1,5 @@
-// The plainest way from a float network to fixed point, for tests that need one: ranges from smallest to largest of one evaluation. Real
-// packages are calibrated by the trainer.
+// The plainest way from a float network to fixed point, for tests that need one: ranges from
+// smallest to largest of one evaluation. Real packages are calibrated by the trainer.
 #pragma once
 
 #include <algorithm>
@@ -48,10 +48,13 @@ struct QuantisedNetwork {
       }
     }
     fixed.values.resize(network.layers.size());
-    fixed.values[0] = {.scale = std::max(high[0], -low[0]) / static_cast<float>(kInputMax), .zero_point = 0};
+    fixed.values[0] = {.scale = std::max(high[0], -low[0]) / static_cast<float>(kInputMax),
+                       .zero_point = 0};
     for (size_t value = 1; value < fixed.values.size(); ++value) {
       const float scale = (high[value] - low[value]) / 255;
-      fixed.values[value] = {.scale = scale, .zero_point = std::clamp(kInt8Min - round_to_int(low[value] / scale), kInt8Min, kInt8Max)};
+      fixed.values[value] = {.scale = scale,
+                             .zero_point = std::clamp(kInt8Min - round_to_int(low[value] / scale),
+                                                      kInt8Min, kInt8Max)};
     }
   }
 
@@ -70,12 +73,15 @@ struct QuantisedNetwork {
     std::vector<int32_t>& bias = biases.emplace_back();
     for (uint32_t o = 0; o < layer.out_channels; ++o) {
       float largest = 1e-6f;
-      for (size_t k = 0; k < per_output; ++k) largest = std::max(largest, std::fabs(layer.weights[o * per_output + k]));
+      for (size_t k = 0; k < per_output; ++k)
+        largest = std::max(largest, std::fabs(layer.weights[o * per_output + k]));
       scale.push_back(largest / static_cast<float>(kWeightMax));
       for (size_t k = 0; k < per_output; ++k) {
-        weight.push_back(static_cast<int8_t>(round_to_int(layer.weights[o * per_output + k] / scale[o])));
+        weight.push_back(
+            static_cast<int8_t>(round_to_int(layer.weights[o * per_output + k] / scale[o])));
       }
-      bias.push_back(static_cast<int32_t>(std::lround(double{layer.bias[o]} / (double{fixed.values[layer.inputs[0]].scale} * scale[o]))));
+      bias.push_back(static_cast<int32_t>(std::lround(
+          double{layer.bias[o]} / (double{fixed.values[layer.inputs[0]].scale} * scale[o]))));
     }
     fixed.convolutions[i] = {weight, scale, bias};
   }

@@ -1,4 +1,5 @@
-// A sampler of random numbers with its storage, in the size that a test asks for: for what is true of all samplers, trained or not.
+// A sampler of random numbers with its storage, in the size that a test asks for: for what is true
+// of all samplers, trained or not.
 #pragma once
 
 #include <cmath>
@@ -34,15 +35,19 @@ class RandomSampler {
     for (const MatrixShape& matrix : denoiser_matrices(view.denoiser, view.ranks)) {
       fill(seed, matrices, size_t{matrix.rows} * matrix.columns);
       for (uint32_t n = 0; n < matrix.rows; ++n) {
-        row_scale.push_back(shape.contrast / (73.0f * std::sqrt(static_cast<float>(matrix.columns))));
+        row_scale.push_back(shape.contrast /
+                            (73.0f * std::sqrt(static_cast<float>(matrix.columns))));
         bias.push_back(0.01f * static_cast<float>(static_cast<int>(n % 7) - 3));
       }
     }
     const uint32_t d = view.denoiser.d_model;
-    for (size_t k = 0; k < (view.ranks.size() + 1) * d; ++k) position.push_back(0.1f * static_cast<float>(static_cast<int>(k % 11) - 5));
-    for (size_t k = 0; k < size_t{2 * view.denoiser.blocks + 1} * 2; ++k) norm.insert(norm.end(), d, k % 2 == 0 ? 1.0f : 0.05f);
+    for (size_t k = 0; k < (view.ranks.size() + 1) * d; ++k)
+      position.push_back(0.1f * static_cast<float>(static_cast<int>(k % 11) - 5));
+    for (size_t k = 0; k < size_t{2 * view.denoiser.blocks + 1} * 2; ++k)
+      norm.insert(norm.end(), d, k % 2 == 0 ? 1.0f : 0.05f);
     view.mean = mean, view.directions = directions, view.direction_scale = direction_scale;
-    view.matrices = matrices, view.row_scale = row_scale, view.bias = bias, view.position = position, view.norm = norm;
+    view.matrices = matrices, view.row_scale = row_scale, view.bias = bias,
+    view.position = position, view.norm = norm;
     view.noise.dimension = direction_scale.size();
   }
   RandomSampler(const RandomSampler&) = delete;
@@ -55,7 +60,8 @@ class RandomSampler {
   // Integers from -127 to 127, each as likely; their deviation is 73.
   static void fill(uint64_t seed, std::vector<int8_t>& out, size_t count) {
     for (size_t k = 0; k < count; ++k) {
-      const uint32_t word = philox4x32_10({static_cast<uint32_t>(out.size()), 0, 0, 0}, {static_cast<uint32_t>(seed), 7})[0];
+      const uint32_t word = philox4x32_10({static_cast<uint32_t>(out.size()), 0, 0, 0},
+                                          {static_cast<uint32_t>(seed), 7})[0];
       out.push_back(static_cast<int8_t>(static_cast<int>(word % 255) - 127));
     }
   }

@@ -1,4 +1,5 @@
-// The network by its definition: loops over every tap, in the scalar type of the caller's choice. The truth that XNNPACK is held against.
+// The network by its definition: loops over every tap, in the scalar type of the caller's choice.
+// The truth that XNNPACK is held against.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +13,10 @@
 namespace figurine::tests {
 
 template <class Scalar>
-std::vector<Scalar> convolve(const Layer& layer, const std::vector<Scalar>& input, const ValueShape& shape) {
-  const int size = static_cast<int>(shape.size), channels = static_cast<int>(shape.channels), kernel = static_cast<int>(layer.kernel);
+std::vector<Scalar> convolve(const Layer& layer, const std::vector<Scalar>& input,
+                             const ValueShape& shape) {
+  const int size = static_cast<int>(shape.size), channels = static_cast<int>(shape.channels),
+            kernel = static_cast<int>(layer.kernel);
   std::vector<Scalar> output;
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
@@ -24,7 +27,8 @@ std::vector<Scalar> convolve(const Layer& layer, const std::vector<Scalar>& inpu
             const int from_y = y + ky - kernel / 2, from_x = x + kx - kernel / 2;
             if (from_y < 0 || from_y >= size || from_x < 0 || from_x >= size) continue;
             const Scalar* pixel = &input[(size_t(from_y) * size + from_x) * channels];
-            const float* weights = &layer.weights[((size_t(o) * kernel + ky) * kernel + kx) * channels];
+            const float* weights =
+                &layer.weights[((size_t(o) * kernel + ky) * kernel + kx) * channels];
             for (int c = 0; c < channels; ++c) sum += pixel[c] * weights[c];
           }
         }
@@ -42,18 +46,23 @@ std::vector<Scalar> max_pool(const std::vector<Scalar>& input, const ValueShape&
   for (size_t y = 0; y < half; ++y) {
     for (size_t x = 0; x < half; ++x) {
       for (size_t c = 0; c < channels; ++c) {
-        const auto at = [&](size_t dy, size_t dx) { return input[((2 * y + dy) * size + 2 * x + dx) * channels + c]; };
-        output[(y * half + x) * channels + c] = std::max(std::max(at(0, 0), at(0, 1)), std::max(at(1, 0), at(1, 1)));
+        const auto at = [&](size_t dy, size_t dx) {
+          return input[((2 * y + dy) * size + 2 * x + dx) * channels + c];
+        };
+        output[(y * half + x) * channels + c] =
+            std::max(std::max(at(0, 0), at(0, 1)), std::max(at(1, 0), at(1, 1)));
       }
     }
   }
   return output;
 }
 
-// Output pixel i has its centre at (i + 0.5) / 2 - 0.5 of the input; outside its first and last centre the input repeats.
+// Output pixel i has its centre at (i + 0.5) / 2 - 0.5 of the input; outside its first and last
+// centre the input repeats.
 template <class Scalar>
 std::vector<Scalar> upsample(const std::vector<Scalar>& input, const ValueShape& shape) {
-  const int size = static_cast<int>(shape.size), channels = static_cast<int>(shape.channels), twice = 2 * size;
+  const int size = static_cast<int>(shape.size), channels = static_cast<int>(shape.channels),
+            twice = 2 * size;
   const auto place = [&](int i, int& low, int& high, Scalar& part) {
     const Scalar centre = std::max(Scalar(0), (Scalar(i) + Scalar(0.5)) / 2 - Scalar(0.5));
     low = std::min(static_cast<int>(centre), size - 1);
@@ -68,8 +77,11 @@ std::vector<Scalar> upsample(const std::vector<Scalar>& input, const ValueShape&
       place(y, y0, y1, py);
       place(x, x0, x1, px);
       for (int c = 0; c < channels; ++c) {
-        const auto at = [&](int row, int column) { return input[(size_t(row) * size + column) * channels + c]; };
-        const Scalar top = at(y0, x0) + px * (at(y0, x1) - at(y0, x0)), bottom = at(y1, x0) + px * (at(y1, x1) - at(y1, x0));
+        const auto at = [&](int row, int column) {
+          return input[(size_t(row) * size + column) * channels + c];
+        };
+        const Scalar top = at(y0, x0) + px * (at(y0, x1) - at(y0, x0)),
+                     bottom = at(y1, x0) + px * (at(y1, x1) - at(y1, x0));
         output[(size_t(y) * twice + x) * channels + c] = top + py * (bottom - top);
       }
     }
@@ -79,7 +91,8 @@ std::vector<Scalar> upsample(const std::vector<Scalar>& input, const ValueShape&
 
 // All values, the input first.
 template <class Scalar>
-std::vector<std::vector<Scalar>> evaluate_reference(const Network& network, const std::vector<ValueShape>& shapes,
+std::vector<std::vector<Scalar>> evaluate_reference(const Network& network,
+                                                    const std::vector<ValueShape>& shapes,
                                                     std::vector<Scalar> input) {
   std::vector<std::vector<Scalar>> values{std::move(input)};
   for (const Layer& layer : network.layers) {
@@ -97,7 +110,8 @@ std::vector<std::vector<Scalar>> evaluate_reference(const Network& network, cons
         break;
       case LayerOp::kConcat: {
         const std::vector<Scalar>& b = values[layer.inputs[1]];
-        const size_t ca = shape.channels, cb = shapes[layer.inputs[1]].channels, pixels = size_t(shape.size) * shape.size;
+        const size_t ca = shape.channels, cb = shapes[layer.inputs[1]].channels,
+                     pixels = size_t(shape.size) * shape.size;
         std::vector<Scalar> joined;
         for (size_t p = 0; p < pixels; ++p) {
           joined.insert(joined.end(), a.begin() + p * ca, a.begin() + (p + 1) * ca);
@@ -113,7 +127,8 @@ std::vector<std::vector<Scalar>> evaluate_reference(const Network& network, cons
 
 // The last value.
 template <class Scalar>
-std::vector<Scalar> run_reference(const Network& network, const std::vector<ValueShape>& shapes, std::vector<Scalar> input) {
+std::vector<Scalar> run_reference(const Network& network, const std::vector<ValueShape>& shapes,
+                                  std::vector<Scalar> input) {
   return evaluate_reference<Scalar>(network, shapes, std::move(input)).back();
 }
 

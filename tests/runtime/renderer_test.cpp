@@ -1,5 +1,5 @@
-// The renderer from the outside: avatars and static Gaussians in one frame, formats, backgrounds, errors, and the same pixels for any
-// number of threads.
+// The renderer from the outside: avatars and static Gaussians in one frame, formats, backgrounds,
+// errors, and the same pixels for any number of threads.
 #include "figurine/renderer.h"
 
 #include <gtest/gtest.h>
@@ -34,13 +34,15 @@ using tests::SyntheticPose;
 
 std::vector<uint8_t> render_bytes(Renderer& renderer, const Frame& frame) {
   std::vector<uint8_t> rgba(size_t(frame.camera.width_px) * frame.camera.height_px * 4, 77);
-  const Status status =
-      renderer.render(frame, {.pixels = rgba.data(), .stride_bytes = size_t(4) * frame.camera.width_px, .format = PixelFormat::kRgba8});
+  const Status status = renderer.render(frame, {.pixels = rgba.data(),
+                                                .stride_bytes = size_t(4) * frame.camera.width_px,
+                                                .format = PixelFormat::kRgba8});
   EXPECT_TRUE(status.ok()) << status.message();
   return rgba;
 }
 
-AvatarId add(Renderer& renderer, const SyntheticAvatar& avatar, const SyntheticBody& body, std::optional<Precision> precision = {}) {
+AvatarId add(Renderer& renderer, const SyntheticAvatar& avatar, const SyntheticBody& body,
+             std::optional<Precision> precision = {}) {
   const Result<AvatarId> id = renderer.add_avatar(*avatar.package, *body.package, precision);
   FIG_CHECK(id.ok(), id.status().message().c_str());
   return *id;
@@ -49,16 +51,21 @@ AvatarId add(Renderer& renderer, const SyntheticAvatar& avatar, const SyntheticB
 // The network's result by its definition, in the precision that the avatar holds.
 std::vector<double> reference_head(const Avatar& avatar, const std::vector<float>& maps) {
   if (avatar.holds(Precision::kFloat32)) {
-    return tests::run_reference<double>(avatar.network, *infer_shapes(avatar.network, true), {maps.begin(), maps.end()});
+    return tests::run_reference<double>(avatar.network, *infer_shapes(avatar.network, true),
+                                        {maps.begin(), maps.end()});
   }
   std::vector<int16_t> quantised;
-  for (const float value : maps) quantised.push_back(quantise_input(value, avatar.fixed_point.values[0].scale));
-  const std::vector<float> result = evaluate_fixed_point(avatar.network, avatar.fixed_point, quantised).result;
+  for (const float value : maps)
+    quantised.push_back(quantise_input(value, avatar.fixed_point.values[0].scale));
+  const std::vector<float> result =
+      evaluate_fixed_point(avatar.network, avatar.fixed_point, quantised).result;
   return {result.begin(), result.end()};
 }
 
-// The Gaussians of an avatar by the definitions of figurine/avatar.h and body.h, everything after the shared pose arithmetic in double.
-oracle::Gaussians reference_gaussians(const Avatar& avatar, const Body& body, const PoseView& pose) {
+// The Gaussians of an avatar by the definitions of figurine/avatar.h and body.h, everything after
+// the shared pose arithmetic in double.
+oracle::Gaussians reference_gaussians(const Avatar& avatar, const Body& body,
+                                      const PoseView& pose) {
   const uint32_t stride = kMapChannels + 4 * avatar.fourier_octaves;
   std::vector<float> maps(size_t(body.uv_size) * body.uv_size * stride);
   std::vector<Affine> transforms(body.joint_count());
@@ -67,7 +74,9 @@ oracle::Gaussians reference_gaussians(const Avatar& avatar, const Body& body, co
   const std::vector<double> head = reference_head(avatar, maps);
 
   std::vector<float> joints(body.joint_position_m.size()), texels(body.texel_position_m.size());
-  shape_body(body, avatar.template_mode == TemplateMode::kShaped ? avatar.shape : std::span<const float>(), joints, texels);
+  shape_body(
+      body, avatar.template_mode == TemplateMode::kShaped ? avatar.shape : std::span<const float>(),
+      joints, texels);
   skinning_transforms({body.parents, joints}, pose, transforms);
 
   const HeadDecoding& decoding = avatar.decoding;
@@ -78,17 +87,21 @@ oracle::Gaussians reference_gaussians(const Avatar& avatar, const Body& body, co
     for (int k = 0; k < 3; ++k) {
       canonical[k] = texels[3 * i + k] + decoding.offset_scale_m * h[k];
       scale[k] = double(decoding.spacing_scale) * body.texel_spacing_m[i] *
-                 std::exp(std::clamp(h[3 + k], -double(decoding.max_log_scale), double(decoding.max_log_scale)));
+                 std::exp(std::clamp(h[3 + k], -double(decoding.max_log_scale),
+                                     double(decoding.max_log_scale)));
     }
-    const double length = std::sqrt((1 + h[6]) * (1 + h[6]) + h[7] * h[7] + h[8] * h[8] + h[9] * h[9]);
+    const double length =
+        std::sqrt((1 + h[6]) * (1 + h[6]) + h[7] * h[7] + h[8] * h[8] + h[9] * h[9]);
     const double w = (1 + h[6]) / length, x = h[7] / length, y = h[8] / length, z = h[9] / length;
-    const double rotation[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-                                2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                                2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+    const double rotation[9] = {
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+        2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
     double blended[12] = {};
     for (uint32_t k = 0; k < kSkinInfluences; ++k) {
       const float weight = body.texel_weights[i * kSkinInfluences + k];
-      for (int e = 0; e < 12; ++e) blended[e] += double(weight) * transforms[body.texel_joints[i * kSkinInfluences + k]].m[e];
+      for (int e = 0; e < 12; ++e)
+        blended[e] += double(weight) * transforms[body.texel_joints[i * kSkinInfluences + k]].m[e];
     }
     for (int r = 0; r < 3; ++r) {
       double position = blended[4 * r + 3];
@@ -107,25 +120,32 @@ oracle::Gaussians reference_gaussians(const Avatar& avatar, const Body& body, co
 }
 
 TEST(Renderer, PosedGaussiansFollowTheDefinitions) {
-  const std::pair<TemplateMode, Held> kinds[] = {
-      {TemplateMode::kMean, Held::kFloat32}, {TemplateMode::kShaped, Held::kFloat32}, {TemplateMode::kShaped, Held::kFixedPoint}};
+  const std::pair<TemplateMode, Held> kinds[] = {{TemplateMode::kMean, Held::kFloat32},
+                                                 {TemplateMode::kShaped, Held::kFloat32},
+                                                 {TemplateMode::kShaped, Held::kFixedPoint}};
   for (const auto& [mode, held] : kinds) {
     const SyntheticBody body = make_test_body({.uv_size = 32, .joints = 5});
-    const SyntheticAvatar avatar = make_test_avatar(body, {.channels = 8, .sh_degree = 1, .template_mode = mode, .held = held});
+    const SyntheticAvatar avatar = make_test_avatar(
+        body, {.channels = 8, .sh_degree = 1, .template_mode = mode, .held = held});
     const std::unique_ptr<Renderer> renderer = make_renderer();
     const AvatarId id = add(*renderer, avatar, body);
-    LargestError position("positions, metres"), factor("covariance factors, metres"), opacity("opacities"), sh("SH coefficients");
+    LargestError position("positions, metres"), factor("covariance factors, metres"),
+        opacity("opacities"), sh("SH coefficients");
     for (uint32_t frame : {0u, 3u}) {
       const SyntheticPose pose = make_test_pose(body.body(), frame);
       const Result<GaussianView> posed = renderer->pose_avatar(id, pose.view());
       ASSERT_TRUE(posed.ok());
-      const oracle::Gaussians truth = reference_gaussians(avatar.package->avatar(), body.body(), pose.view());
+      const oracle::Gaussians truth =
+          reference_gaussians(avatar.package->avatar(), body.body(), pose.view());
       ASSERT_EQ(posed->count, truth.count);
       ASSERT_EQ(posed->sh_degree, 1u);
       ASSERT_EQ(posed->sh.size(), truth.sh.size());
-      for (size_t i = 0; i < truth.position_m.size(); ++i) position.add(posed->position_m[i], truth.position_m[i]);
-      for (size_t i = 0; i < truth.covariance_factor.size(); ++i) factor.add(posed->covariance_factor[i], truth.covariance_factor[i]);
-      for (size_t i = 0; i < truth.opacity.size(); ++i) opacity.add(posed->opacity[i], truth.opacity[i]);
+      for (size_t i = 0; i < truth.position_m.size(); ++i)
+        position.add(posed->position_m[i], truth.position_m[i]);
+      for (size_t i = 0; i < truth.covariance_factor.size(); ++i)
+        factor.add(posed->covariance_factor[i], truth.covariance_factor[i]);
+      for (size_t i = 0; i < truth.opacity.size(); ++i)
+        opacity.add(posed->opacity[i], truth.opacity[i]);
       for (size_t i = 0; i < truth.sh.size(); ++i) sh.add(posed->sh[i], truth.sh[i]);
     }
     EXPECT_LE(position.largest(), 1e-6);
@@ -143,9 +163,11 @@ TEST(Renderer, AnAvatarsPictureIsTheOraclesOfItsGaussians) {
   const FrameAvatar seen[] = {{.avatar = add(*renderer, avatar, body), .pose = pose.view()}};
   const Camera camera = make_test_camera(160, 200);
   const FloatImage image = tests::render(*renderer, {.camera = camera, .avatars = seen});
-  const oracle::Image truth = oracle::render(reference_gaussians(avatar.package->avatar(), body.body(), pose.view()), camera);
+  const oracle::Image truth = oracle::render(
+      reference_gaussians(avatar.package->avatar(), body.body(), pose.view()), camera);
   std::vector<float> premultiplied = image.rgba;
-  for (size_t i = 0; i < premultiplied.size(); ++i) premultiplied[i] *= i % 4 == 3 ? 1 : image.rgba[i / 4 * 4 + 3];
+  for (size_t i = 0; i < premultiplied.size(); ++i)
+    premultiplied[i] *= i % 4 == 3 ? 1 : image.rgba[i / 4 * 4 + 3];
   const double psnr = oracle::foreground_psnr_db<float>(truth, premultiplied);
   std::printf("foreground PSNR of a frame, pose to pixels, against double: %.1f dB\n", psnr);
   EXPECT_GE(psnr, 90);
@@ -155,7 +177,8 @@ TEST(Renderer, AnAvatarsPictureIsTheOraclesOfItsGaussians) {
 }
 
 TEST(Renderer, AvatarsAndStaticGaussiansOccludeEachOther) {
-  // Two cylinders, red at z = +0.6 and blue at z = -0.6, seen from the front and from behind; a green wall between them, at z = 0.
+  // Two cylinders, red at z = +0.6 and blue at z = -0.6, seen from the front and from behind; a
+  // green wall between them, at z = 0.
   const SyntheticBody body = make_test_body({.uv_size = 32});
   const SyntheticAvatar red = make_test_avatar(body, {.colour = {2, -2, -2}, .seed = 5}),
                         blue = make_test_avatar(body, {.colour = {-2, -2, 2}, .seed = 6});
@@ -167,13 +190,16 @@ TEST(Renderer, AvatarsAndStaticGaussiansOccludeEachOther) {
                               {.avatar = add(*renderer, blue, body), .pose = back.view()}};
   Scene wall;
   for (int i = 0; i < 400; ++i) {
-    wall.add_ball({-0.5f + 0.05f * static_cast<float>(i % 20), 0.4f + 0.05f * static_cast<float>(i / 20), 0}, 0.05f, 1, {0, 1, 0});
+    wall.add_ball(
+        {-0.5f + 0.05f * static_cast<float>(i % 20), 0.4f + 0.05f * static_cast<float>(i / 20), 0},
+        0.05f, 1, {0, 1, 0});
   }
   const GaussianView wall_view = wall.view();
   const auto middle = [&](float azimuth_deg, bool with_wall) {
     const Frame frame{.camera = make_test_camera(101, 101, azimuth_deg),
                       .avatars = seen,
-                      .gaussians = with_wall ? std::span<const GaussianView>(&wall_view, 1) : std::span<const GaussianView>()};
+                      .gaussians = with_wall ? std::span<const GaussianView>(&wall_view, 1)
+                                             : std::span<const GaussianView>()};
     return tests::render(*renderer, frame).at(50, 50);
   };
   const std::array<float, 4> from_front = middle(0, false), from_behind = middle(180, false);
@@ -184,7 +210,9 @@ TEST(Renderer, AvatarsAndStaticGaussiansOccludeEachOther) {
   EXPECT_GT(front_wall[0], front_wall[1] + 0.3f);
   EXPECT_GT(behind_wall[2], behind_wall[1] + 0.3f);
   // Seen from the side nobody stands before the wall's edge.
-  const Frame only_back{.camera = make_test_camera(101, 101, 0), .avatars = {seen + 1, 1}, .gaussians = {&wall_view, 1}};
+  const Frame only_back{.camera = make_test_camera(101, 101, 0),
+                        .avatars = {seen + 1, 1},
+                        .gaussians = {&wall_view, 1}};
   const std::array<float, 4> hidden = tests::render(*renderer, only_back).at(50, 50);
   EXPECT_GT(hidden[1], 0.9f) << "the wall hides blue";
 }
@@ -197,7 +225,8 @@ TEST(Renderer, OneAvatarTwiceInAFrame) {
   SyntheticPose left = make_test_pose(body.body(), 0), right = left;
   left.root_translation_m[0] = -0.6f;
   right.root_translation_m[0] = 0.6f;
-  const FrameAvatar both[] = {{.avatar = id, .pose = left.view()}, {.avatar = id, .pose = right.view()}};
+  const FrameAvatar both[] = {{.avatar = id, .pose = left.view()},
+                              {.avatar = id, .pose = right.view()}};
   const Camera camera = make_test_camera(96, 96);
   const FloatImage pair = tests::render(*renderer, {.camera = camera, .avatars = both});
   const FloatImage single = tests::render(*renderer, {.camera = camera, .avatars = {both, 1}});
@@ -221,11 +250,15 @@ TEST(Renderer, TheSamePixelsForAnyNumberOfThreads) {
   for (const uint32_t threads : {1u, 2u, 3u, 4u}) {
     const std::unique_ptr<Renderer> renderer = make_renderer(threads);
     const FrameAvatar seen[] = {{.avatar = add(*renderer, avatar, body), .pose = pose.view()}};
-    images.push_back(tests::render(*renderer, {.camera = make_test_camera(200, 150), .avatars = seen, .gaussians = {&view, 1}}).rgba);
+    images.push_back(tests::render(*renderer, {.camera = make_test_camera(200, 150),
+                                               .avatars = seen,
+                                               .gaussians = {&view, 1}})
+                         .rgba);
     statistics.push_back(renderer->statistics());
   }
   for (size_t i = 1; i < images.size(); ++i) {
-    EXPECT_EQ(std::memcmp(images[i].data(), images[0].data(), images[0].size() * sizeof(float)), 0) << i + 1 << " threads";
+    EXPECT_EQ(std::memcmp(images[i].data(), images[0].data(), images[0].size() * sizeof(float)), 0)
+        << i + 1 << " threads";
     EXPECT_EQ(statistics[i].visible, statistics[0].visible);
     EXPECT_EQ(statistics[i].pairs, statistics[0].pairs);
     EXPECT_EQ(statistics[i].blends, statistics[0].blends);
@@ -238,24 +271,30 @@ TEST(Renderer, FramesDoNotRememberEarlierOnes) {
   const std::unique_ptr<Renderer> renderer = make_renderer();
   const AvatarId id = add(*renderer, avatar, body);
   const SyntheticPose a = make_test_pose(body.body(), 1), b = make_test_pose(body.body(), 2);
-  const FrameAvatar first[] = {{.avatar = id, .pose = a.view()}}, second[] = {{.avatar = id, .pose = b.view()}};
-  const std::vector<uint8_t> before = render_bytes(*renderer, {.camera = make_test_camera(80, 80), .avatars = first});
+  const FrameAvatar first[] = {{.avatar = id, .pose = a.view()}},
+                    second[] = {{.avatar = id, .pose = b.view()}};
+  const std::vector<uint8_t> before =
+      render_bytes(*renderer, {.camera = make_test_camera(80, 80), .avatars = first});
   render_bytes(*renderer, {.camera = make_test_camera(300, 200), .avatars = second});
-  const std::vector<uint8_t> small = render_bytes(*renderer, {.camera = make_test_camera(16, 16), .avatars = second});
+  const std::vector<uint8_t> small =
+      render_bytes(*renderer, {.camera = make_test_camera(16, 16), .avatars = second});
   EXPECT_NE(small, std::vector<uint8_t>(16 * 16 * 4, 0));
-  EXPECT_EQ(render_bytes(*renderer, {.camera = make_test_camera(80, 80), .avatars = first}), before);
+  EXPECT_EQ(render_bytes(*renderer, {.camera = make_test_camera(80, 80), .avatars = first}),
+            before);
 }
 
 TEST(Renderer, MorePairsThanTheListHoldsAreDrawnInBands) {
-  // 1,000 Gaussians that fill 12 x 10 tiles: 120,000 pairs, twice the list. 1,000 layers of alpha 0.002 leave 0.998^1000 of the light,
-  // everywhere.
+  // 1,000 Gaussians that fill 12 x 10 tiles: 120,000 pairs, twice the list. 1,000 layers of alpha
+  // 0.002 leave 0.998^1000 of the light, everywhere.
   Scene scene;
   for (uint32_t i = 0; i < 1000; ++i)
-    scene.add_ball({0, 0, 2 + 1e-4f * static_cast<float>(i)}, 1000, 0.002f, {i < 500 ? 1.0f : 0.0f, 0.5f, 1});
+    scene.add_ball({0, 0, 2 + 1e-4f * static_cast<float>(i)}, 1000, 0.002f,
+                   {i < 500 ? 1.0f : 0.0f, 0.5f, 1});
   const std::unique_ptr<Renderer> renderer = make_renderer();
   const GaussianView view = scene.view();
-  const FloatImage image =
-      tests::render(*renderer, {.camera = tests::front_camera(384, 320, 40), .gaussians = {&view, 1}, .splat = {.alpha_cut = 1e-3f}});
+  const FloatImage image = tests::render(*renderer, {.camera = tests::front_camera(384, 320, 40),
+                                                     .gaussians = {&view, 1},
+                                                     .splat = {.alpha_cut = 1e-3f}});
   EXPECT_EQ(renderer->statistics().pairs, 1000u * 120);
   EXPECT_EQ(renderer->statistics().blends, 1000u * 384 * 320);
   const double alpha = 1 - std::pow(0.998, 1000), red = (1 - std::pow(0.998, 500)) / alpha;
@@ -277,8 +316,11 @@ TEST(Renderer, BackgroundAndAlphaConventions) {
   Camera camera = tests::front_camera(33, 33, 50);
   const std::unique_ptr<Renderer> renderer = make_renderer();
   const FloatImage straight = tests::render(*renderer, {.camera = camera, .gaussians = {&view, 1}});
-  const FloatImage over = tests::render(*renderer, {.camera = camera, .gaussians = {&view, 1}, .background = std::array{0.1f, 0.5f, 0.9f}});
-  // In the middle alpha is 0.6: straight colour is the Gaussian's own; over the background 0.6 of it and 0.4 of the background.
+  const FloatImage over = tests::render(
+      *renderer,
+      {.camera = camera, .gaussians = {&view, 1}, .background = std::array{0.1f, 0.5f, 0.9f}});
+  // In the middle alpha is 0.6: straight colour is the Gaussian's own; over the background 0.6 of
+  // it and 0.4 of the background.
   const std::array<float, 4> middle = straight.at(16, 16), mixed = over.at(16, 16);
   const float colour[3] = {0.8f, 0.4f, 0.2f}, behind[3] = {0.1f, 0.5f, 0.9f};
   EXPECT_NEAR(middle[3], 0.6, 1e-6);
@@ -290,9 +332,11 @@ TEST(Renderer, BackgroundAndAlphaConventions) {
   EXPECT_EQ(straight.at(0, 0), (std::array<float, 4>{0, 0, 0, 0}));
   EXPECT_EQ(over.at(0, 0), (std::array<float, 4>{0.1f, 0.5f, 0.9f, 1}));
 
-  const std::vector<uint8_t> bytes =
-      render_bytes(*renderer, {.camera = camera, .gaussians = {&view, 1}, .background = std::array{0.1f, 0.5f, 0.9f}});
-  const std::vector<uint8_t> alpha = render_bytes(*renderer, {.camera = camera, .gaussians = {&view, 1}});
+  const std::vector<uint8_t> bytes = render_bytes(
+      *renderer,
+      {.camera = camera, .gaussians = {&view, 1}, .background = std::array{0.1f, 0.5f, 0.9f}});
+  const std::vector<uint8_t> alpha =
+      render_bytes(*renderer, {.camera = camera, .gaussians = {&view, 1}});
   for (size_t i = 0; i < bytes.size(); ++i) {
     ASSERT_NEAR(bytes[i], 255 * over.rgba[i], 0.5001);
     ASSERT_NEAR(alpha[i], 255 * straight.rgba[i], 0.5001);
@@ -317,11 +361,13 @@ TEST(Renderer, RowsMayBeLongerThanTheImage) {
   const GaussianView view = scene.view();
   const std::unique_ptr<Renderer> renderer = make_renderer();
   std::vector<uint8_t> rgba(100 * 40, 77);
-  ASSERT_TRUE(
-      renderer->render({.camera = tests::front_camera(20, 40, 50), .gaussians = {&view, 1}}, {.pixels = rgba.data(), .stride_bytes = 100})
-          .ok());
+  ASSERT_TRUE(renderer
+                  ->render({.camera = tests::front_camera(20, 40, 50), .gaussians = {&view, 1}},
+                           {.pixels = rgba.data(), .stride_bytes = 100})
+                  .ok());
   for (size_t y = 0; y < 40; ++y) {
-    for (size_t i = 80; i < 100; ++i) ASSERT_EQ(rgba[y * 100 + i], 77) << "bytes behind a row are the caller's";
+    for (size_t i = 80; i < 100; ++i)
+      ASSERT_EQ(rgba[y * 100 + i], 77) << "bytes behind a row are the caller's";
   }
 }
 
@@ -329,8 +375,8 @@ TEST(Renderer, AnEmptyFrameIsItsBackground) {
   const std::unique_ptr<Renderer> renderer = make_renderer();
   const std::vector<uint8_t> clear = render_bytes(*renderer, {.camera = make_test_camera(40, 30)});
   EXPECT_EQ(clear, std::vector<uint8_t>(40 * 30 * 4, 0));
-  const std::vector<uint8_t> white =
-      render_bytes(*renderer, {.camera = make_test_camera(40, 30), .background = std::array{1.0f, 1.0f, 1.0f}});
+  const std::vector<uint8_t> white = render_bytes(
+      *renderer, {.camera = make_test_camera(40, 30), .background = std::array{1.0f, 1.0f, 1.0f}});
   EXPECT_EQ(white, std::vector<uint8_t>(40 * 30 * 4, 255));
   EXPECT_EQ(renderer->statistics().gaussians, 0u);
 }
@@ -342,16 +388,22 @@ TEST(Renderer, AMismatchedBodyIsRefusedNamingBothHashes) {
   const Result<AvatarId> id = renderer->add_avatar(*avatar.package, *other.package);
   ASSERT_FALSE(id.ok());
   EXPECT_EQ(id.status().code(), StatusCode::kMismatch);
-  EXPECT_NE(id.status().message().find(format_hash(body.package->content_hash())), std::string::npos) << id.status().message();
-  EXPECT_NE(id.status().message().find(format_hash(other.package->content_hash())), std::string::npos) << id.status().message();
+  EXPECT_NE(id.status().message().find(format_hash(body.package->content_hash())),
+            std::string::npos)
+      << id.status().message();
+  EXPECT_NE(id.status().message().find(format_hash(other.package->content_hash())),
+            std::string::npos)
+      << id.status().message();
 }
 
 TEST(Renderer, PackagesOfTheWrongKindAreRefused) {
   const SyntheticBody body = make_test_body();
   const SyntheticAvatar avatar = make_test_avatar(body);
   const std::unique_ptr<Renderer> renderer = make_renderer();
-  EXPECT_EQ(renderer->add_avatar(*body.package, *body.package).status().code(), StatusCode::kMismatch);
-  EXPECT_EQ(renderer->add_avatar(*avatar.package, *avatar.package).status().code(), StatusCode::kMismatch);
+  EXPECT_EQ(renderer->add_avatar(*body.package, *body.package).status().code(),
+            StatusCode::kMismatch);
+  EXPECT_EQ(renderer->add_avatar(*avatar.package, *avatar.package).status().code(),
+            StatusCode::kMismatch);
 }
 
 TEST(Renderer, PackageObjectsMayGoWhileTheirBytesStay) {
@@ -406,8 +458,10 @@ TEST(Renderer, UnsoundInputIsRefusedAndNothingIsDrawn) {
 
   refuse("no pixels", good, {.pixels = nullptr, .stride_bytes = 256});
   refuse("short rows", good, {.pixels = rgba.data(), .stride_bytes = 255});
-  refuse("short float rows", good, {.pixels = rgba.data(), .stride_bytes = 256, .format = PixelFormat::kRgbaF32});
-  refuse("misaligned float rows", good, {.pixels = rgba.data(), .stride_bytes = 1026, .format = PixelFormat::kRgbaF32});
+  refuse("short float rows", good,
+         {.pixels = rgba.data(), .stride_bytes = 256, .format = PixelFormat::kRgbaF32});
+  refuse("misaligned float rows", good,
+         {.pixels = rgba.data(), .stride_bytes = 1026, .format = PixelFormat::kRgbaF32});
 
   SyntheticPose bad = pose;
   bad.rotations[5] = nan;
@@ -422,7 +476,8 @@ TEST(Renderer, UnsoundInputIsRefusedAndNothingIsDrawn) {
   const FrameAvatar nobody[] = {{.avatar = AvatarId(7), .pose = pose.view()}};
   frame.avatars = nobody;
   refuse("unknown avatar", frame, target);
-  EXPECT_EQ(renderer->pose_avatar(AvatarId(7), pose.view()).status().code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(renderer->pose_avatar(AvatarId(7), pose.view()).status().code(),
+            StatusCode::kInvalidArgument);
 
   Scene scene;
   scene.add_ball({0, 0, 2}, 0.1f, 1, {1, 1, 1});
@@ -457,13 +512,15 @@ TEST(Renderer, StatisticsCountWhatWasDrawn) {
   scene.add_ball({0, 0.8f, 0.5f}, 1e-6f, 0.5f, {1, 1, 1});
   scene.add_ball({0, 0.8f, 100}, 1e-6f, 0.5f, {1, 1, 1});  // behind the camera
   const GaussianView view = scene.view();
-  render_bytes(**renderer, {.camera = make_test_camera(64, 64), .avatars = seen, .gaussians = {&view, 1}});
+  render_bytes(**renderer,
+               {.camera = make_test_camera(64, 64), .avatars = seen, .gaussians = {&view, 1}});
   const FrameStatistics& statistics = (*renderer)->statistics();
   EXPECT_EQ(statistics.gaussians, body.body().texel_count() + 2);
   EXPECT_EQ(statistics.visible, body.body().texel_count() + 1);
   EXPECT_GE(statistics.pairs, statistics.visible);
   EXPECT_GT(statistics.blends, statistics.visible);
-  EXPECT_EQ(statistics.macs, count_macs(avatar.package->avatar().network, *infer_shapes(avatar.package->avatar().network, true)));
+  EXPECT_EQ(statistics.macs, count_macs(avatar.package->avatar().network,
+                                        *infer_shapes(avatar.package->avatar().network, true)));
   for (size_t stage = 0; stage < kStageCount; ++stage) {
     EXPECT_GT(statistics.stage_ns[stage], 0u) << to_string(static_cast<Stage>(stage));
   }

@@ -1,5 +1,5 @@
-// The solvers' contracts: steps followed by hand, every number of steps finite, pure noise, the clean end, errors. Their orders are
-// observed in tests/toolchain/generate.
+// The solvers' contracts: steps followed by hand, every number of steps finite, pure noise, the
+// clean end, errors. Their orders are observed in tests/toolchain/generate.
 #include "runtime/src/sample/solver.h"
 
 #include <gtest/gtest.h>
@@ -19,9 +19,11 @@ constexpr SolverMethod kMethods[] = {SolverMethod::kDdim, SolverMethod::kDpmSolv
 template <class Real>
 class Given : public Denoiser<Real> {
  public:
-  using Function = std::function<Status(std::span<const Real>, const NoiseLevel&, size_t, std::span<Real>)>;
+  using Function =
+      std::function<Status(std::span<const Real>, const NoiseLevel&, size_t, std::span<Real>)>;
   explicit Given(Function function) : function_(std::move(function)) {}
-  Status predict(std::span<const Real> z, const NoiseLevel& level, size_t evaluation, std::span<Real> x0) override {
+  Status predict(std::span<const Real> z, const NoiseLevel& level, size_t evaluation,
+                 std::span<Real> x0) override {
     return function_(z, level, evaluation, x0);
   }
 
@@ -32,19 +34,22 @@ class Given : public Denoiser<Real> {
 // Of one standard normal value times `deviation`.
 template <class Real>
 Given<Real> gaussian(double deviation) {
-  return Given<Real>([deviation](std::span<const Real> z, const NoiseLevel& level, size_t, std::span<Real> x0) {
+  return Given<Real>([deviation](std::span<const Real> z, const NoiseLevel& level, size_t,
+                                 std::span<Real> x0) {
     const double variance = deviation * deviation;
-    const double factor = level.alpha * variance / (level.alpha * level.alpha * variance + level.sigma * level.sigma);
+    const double factor =
+        level.alpha * variance / (level.alpha * level.alpha * variance + level.sigma * level.sigma);
     for (size_t i = 0; i < z.size(); ++i) x0[i] = static_cast<Real>(factor * z[i]);
     return Status();
   });
 }
 
 Given<double> constant(double value) {
-  return Given<double>([value](std::span<const double>, const NoiseLevel&, size_t, std::span<double> x0) {
-    for (double& x : x0) x = value;
-    return Status();
-  });
+  return Given<double>(
+      [value](std::span<const double>, const NoiseLevel&, size_t, std::span<double> x0) {
+        for (double& x : x0) x = value;
+        return Status();
+      });
 }
 
 template <class Real>
@@ -52,9 +57,11 @@ struct Sampled {
   std::vector<Real> z, x0, previous_x0;
   Status status;
 
-  Sampled(const SolverOptions& options, std::span<const NoiseLevel> levels, Denoiser<Real>& denoiser, std::vector<Real> start,
-          SolverTrace<Real>* trace = nullptr)
-      : z(std::move(start)), x0(z.size(), NAN), previous_x0(z.size(), NAN) {  // storage may hold anything
+  Sampled(const SolverOptions& options, std::span<const NoiseLevel> levels,
+          Denoiser<Real>& denoiser, std::vector<Real> start, SolverTrace<Real>* trace = nullptr)
+      : z(std::move(start)),
+        x0(z.size(), NAN),
+        previous_x0(z.size(), NAN) {  // storage may hold anything
     status = solve<Real>(options, levels, denoiser, {x0, previous_x0}, z, trace);
   }
 };
@@ -68,10 +75,11 @@ std::vector<NoiseLevel> levels_of(uint64_t dimension, size_t steps, bool pure_no
 TEST(Solver, TakesTheStepsOfTheEquations) {
   // Predictions 1, 3, -2, whatever z is.
   const double predictions[] = {1, 3, -2};
-  Given<double> denoiser([&](std::span<const double>, const NoiseLevel&, size_t evaluation, std::span<double> x0) {
-    x0[0] = predictions[evaluation];
-    return Status();
-  });
+  Given<double> denoiser(
+      [&](std::span<const double>, const NoiseLevel&, size_t evaluation, std::span<double> x0) {
+        x0[0] = predictions[evaluation];
+        return Status();
+      });
   const NoiseLevel levels[] = {noise_level(-2), noise_level(-1.5), noise_level(0), noise_level(2)};
   for (const SolverMethod method : kMethods) {
     for (const bool lower_order_final : {false, true}) {
@@ -81,11 +89,13 @@ TEST(Solver, TakesTheStepsOfTheEquations) {
       for (size_t i = 0; i < 3; ++i) {
         const double h = levels[i + 1].lambda - levels[i].lambda;
         double x0 = predictions[i];
-        if (method == SolverMethod::kDpmSolverPlusPlus2M && i > 0 && !(lower_order_final && i == 2)) {
+        if (method == SolverMethod::kDpmSolverPlusPlus2M && i > 0 &&
+            !(lower_order_final && i == 2)) {
           const double r = (levels[i].lambda - levels[i - 1].lambda) / h;
           x0 = (1 + 1 / (2 * r)) * predictions[i] - 1 / (2 * r) * predictions[i - 1];
         }
-        z = levels[i + 1].sigma / levels[i].sigma * z - levels[i + 1].alpha * (std::exp(-h) - 1) * x0;
+        z = levels[i + 1].sigma / levels[i].sigma * z -
+            levels[i + 1].alpha * (std::exp(-h) - 1) * x0;
       }
       EXPECT_NEAR(run.z[0], z, 1e-14);
     }
@@ -100,7 +110,8 @@ TEST(Solver, AConstantPredictionIsFollowedExactlyByAnySteps) {
       const Sampled<double> run({method}, levels, denoiser, {-1.5});
       ASSERT_TRUE(run.status.ok()) << run.status.message();
       const double noise = (-1.5 - levels.front().alpha * 0.25) / levels.front().sigma;
-      EXPECT_NEAR(run.z[0], levels.back().alpha * 0.25 + levels.back().sigma * noise, 1e-13) << steps;
+      EXPECT_NEAR(run.z[0], levels.back().alpha * 0.25 + levels.back().sigma * noise, 1e-13)
+          << steps;
     }
   }
 }
@@ -127,8 +138,8 @@ void expect_finite_for_few_steps() {
             fill_normal(1, steps, noise);
             for (size_t i = 0; i < 64; ++i) start[i] = static_cast<Real>(noise[i]);
             Given<Real> denoiser = gaussian<Real>(deviation);
-            const Sampled<Real> run({method, (flags & 1) != 0, (flags & 2) != 0}, levels_of(dimension, steps, (flags & 4) != 0), denoiser,
-                                    start);
+            const Sampled<Real> run({method, (flags & 1) != 0, (flags & 2) != 0},
+                                    levels_of(dimension, steps, (flags & 4) != 0), denoiser, start);
             ASSERT_TRUE(run.status.ok()) << run.status.message();
             for (const Real value : run.z) {
               ASSERT_TRUE(std::isfinite(value));
@@ -148,10 +159,11 @@ TEST(Solver, TheLastStepToNoNoiseIsThePrediction) {
   std::vector<NoiseLevel> levels(501);
   linear_beta_levels(levels);
   double last = 0;
-  Given<double> denoiser([&](std::span<const double> z, const NoiseLevel& level, size_t, std::span<double> x0) {
-    last = x0[0] = 0.9 * level.alpha * z[0] + 0.1;
-    return Status();
-  });
+  Given<double> denoiser(
+      [&](std::span<const double> z, const NoiseLevel& level, size_t, std::span<double> x0) {
+        last = x0[0] = 0.9 * level.alpha * z[0] + 0.1;
+        return Status();
+      });
   for (const SolverMethod method : kMethods) {
     const Sampled<double> run({method}, levels, denoiser, {1.25});
     ASSERT_TRUE(run.status.ok()) << run.status.message();
@@ -160,20 +172,23 @@ TEST(Solver, TheLastStepToNoNoiseIsThePrediction) {
 }
 
 TEST(Solver, TheFinalPredictionIsThatOfTheCleanEnd) {
-  Given<double> denoiser([](std::span<const double> z, const NoiseLevel& level, size_t, std::span<double> x0) {
-    x0[0] = z[0] + level.lambda;
-    return Status();
-  });
+  Given<double> denoiser(
+      [](std::span<const double> z, const NoiseLevel& level, size_t, std::span<double> x0) {
+        x0[0] = z[0] + level.lambda;
+        return Status();
+      });
   const NoiseLevel levels[] = {noise_level(-1), noise_level(2)};
   const Sampled<double> without({SolverMethod::kDdim}, levels, denoiser, {0.5});
-  const Sampled<double> with({.method = SolverMethod::kDdim, .final_x0 = true}, levels, denoiser, {0.5});
+  const Sampled<double> with({.method = SolverMethod::kDdim, .final_x0 = true}, levels, denoiser,
+                             {0.5});
   EXPECT_EQ(with.z[0], without.z[0] + 2);
 }
 
 TEST(Solver, TheTraceSeesEveryStep) {
   struct Seen : SolverTrace<double> {
     std::vector<double> z, lambda;
-    void after_step(size_t step, const NoiseLevel& level, std::span<const double> state, std::span<const double>) override {
+    void after_step(size_t step, const NoiseLevel& level, std::span<const double> state,
+                    std::span<const double>) override {
       EXPECT_EQ(step, z.size());
       z.push_back(state[0]);
       lambda.push_back(level.lambda);
@@ -189,7 +204,8 @@ TEST(Solver, TheTraceSeesEveryStep) {
 
 TEST(Solver, RefusesWhatIsNoRun) {
   Given<double> denoiser = constant(1);
-  const NoiseLevel a = noise_level(-1), b = noise_level(1), no_noise = noise_level(INFINITY), nan = noise_level(NAN);
+  const NoiseLevel a = noise_level(-1), b = noise_level(1), no_noise = noise_level(INFINITY),
+                   nan = noise_level(NAN);
   const std::vector<std::vector<NoiseLevel>> wrong = {{},
                                                       {a},
                                                       {b, a},
@@ -201,37 +217,45 @@ TEST(Solver, RefusesWhatIsNoRun) {
                                                       {a, noise_level(800), no_noise},
                                                       std::vector<NoiseLevel>(1002, a)};
   for (const std::vector<NoiseLevel>& levels : wrong) {
-    EXPECT_EQ(Sampled<double>({}, levels, denoiser, {1}).status.code(), StatusCode::kInvalidArgument) << levels.size();
+    EXPECT_EQ(Sampled<double>({}, levels, denoiser, {1}).status.code(),
+              StatusCode::kInvalidArgument)
+        << levels.size();
   }
-  EXPECT_EQ(Sampled<double>({}, std::vector{a, b}, denoiser, {NAN}).status.code(), StatusCode::kInvalidArgument);
-  EXPECT_EQ(Sampled<double>({}, std::vector{a, b}, denoiser, {INFINITY}).status.code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(Sampled<double>({}, std::vector{a, b}, denoiser, {NAN}).status.code(),
+            StatusCode::kInvalidArgument);
+  EXPECT_EQ(Sampled<double>({}, std::vector{a, b}, denoiser, {INFINITY}).status.code(),
+            StatusCode::kInvalidArgument);
 }
 
 TEST(Solver, ReportsPredictionsAndStatesThatAreNotFinite) {
   const std::vector<NoiseLevel> levels = levels_of(100, 5, true);
   for (const double bad : {double(NAN), double(INFINITY), -double(INFINITY)}) {
-    Given<double> denoiser([&](std::span<const double>, const NoiseLevel&, size_t evaluation, std::span<double> x0) {
-      x0[0] = 1;
-      x0[1] = evaluation == 3 ? bad : 1;
-      return Status();
-    });
+    Given<double> denoiser(
+        [&](std::span<const double>, const NoiseLevel&, size_t evaluation, std::span<double> x0) {
+          x0[0] = 1;
+          x0[1] = evaluation == 3 ? bad : 1;
+          return Status();
+        });
     const Sampled<double> run({}, levels, denoiser, {1, 1});
     EXPECT_EQ(run.status.code(), StatusCode::kInvalidArgument);
     EXPECT_EQ(run.status.message(), "sampling: prediction 3 is not finite");
   }
   // Finite predictions whose extrapolation is not.
-  Given<float> far([](std::span<const float>, const NoiseLevel&, size_t evaluation, std::span<float> x0) {
-    x0[0] = evaluation % 2 == 0 ? 3e38f : -3e38f;
-    return Status();
-  });
+  Given<float> far(
+      [](std::span<const float>, const NoiseLevel&, size_t evaluation, std::span<float> x0) {
+        x0[0] = evaluation % 2 == 0 ? 3e38f : -3e38f;
+        return Status();
+      });
   const Sampled<float> run({}, levels_of(100, 5, false), far, {1});
   EXPECT_EQ(run.status.message(), "sampling: step 1 is not finite");
 }
 
 TEST(Solver, ReturnsTheErrorOfTheDenoiser) {
-  Given<double> denoiser(
-      [](std::span<const double>, const NoiseLevel&, size_t, std::span<double>) { return Status(StatusCode::kInterrupted, "stopped"); });
-  EXPECT_EQ(Sampled<double>({}, levels_of(100, 5, true), denoiser, {1}).status.code(), StatusCode::kInterrupted);
+  Given<double> denoiser([](std::span<const double>, const NoiseLevel&, size_t, std::span<double>) {
+    return Status(StatusCode::kInterrupted, "stopped");
+  });
+  EXPECT_EQ(Sampled<double>({}, levels_of(100, 5, true), denoiser, {1}).status.code(),
+            StatusCode::kInterrupted);
 }
 
 TEST(Solver, HasTheSameBitsOnEveryCpu) {
@@ -240,7 +264,8 @@ TEST(Solver, HasTheSameBitsOnEveryCpu) {
   Given<float> denoiser = gaussian<float>(0.5);
   const Sampled<float> run({}, levels_of(9'886, 10, true), denoiser, start);
   const float golden[4] = {-0x1.c0296ep-3f, -0x1.265e7ep-4f, 0x1.a82f4p-1f, 0x1.aae95ep-3f};
-  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(std::bit_cast<uint32_t>(run.z[i]), std::bit_cast<uint32_t>(golden[i])) << i;
+  for (size_t i = 0; i < 4; ++i)
+    EXPECT_EQ(std::bit_cast<uint32_t>(run.z[i]), std::bit_cast<uint32_t>(golden[i])) << i;
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// Pictures that can be computed by hand: one Gaussian, two, an opaque stack, the cut, the near plane, extremes of size and opacity.
+// Pictures that can be computed by hand: one Gaussian, two, an opaque stack, the cut, the near
+// plane, extremes of size and opacity.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,7 +17,8 @@ using tests::front_camera;
 using tests::render;
 using tests::Scene;
 
-// Weight of an isotropic Gaussian of deviation s on the optical axis at depth z, at dx, dy pixels from its mean.
+// Weight of an isotropic Gaussian of deviation s on the optical axis at depth z, at dx, dy pixels
+// from its mean.
 double weight(double s, double z, double focal, double dx, double dy) {
   const double variance = focal * s / z * (focal * s / z) + double(kDilationPx2);
   return std::exp(-0.5 * (dx * dx + dy * dy) / variance);
@@ -37,7 +39,8 @@ TEST(SplatClosedForm, OneGaussianIsItsBell) {
         EXPECT_EQ(pixel, (std::array<float, 4>{0, 0, 0, 0})) << x << "," << y;
       } else {
         // Straight colour divides by alpha = 1 - T, whose rounding weighs 2^-24 / alpha.
-        for (int c = 0; c < 3; ++c) colour_error.add((pixel[c] - std::array{0.9f, 0.5f, 0.25f}[c]) * alpha);
+        for (int c = 0; c < 3; ++c)
+          colour_error.add((pixel[c] - std::array{0.9f, 0.5f, 0.25f}[c]) * alpha);
       }
     }
   }
@@ -46,15 +49,18 @@ TEST(SplatClosedForm, OneGaussianIsItsBell) {
 }
 
 TEST(SplatClosedForm, AnOffAxisDiscFollowsTheJacobian) {
-  // A disc facing the camera, away from the axis: the covariance is (f s / z)^2 times [[1 + tx^2 e, ...]] with e = 0 for a flat disc.
+  // A disc facing the camera, away from the axis: the covariance is (f s / z)^2 times [[1 + tx^2 e,
+  // ...]] with e = 0 for a flat disc.
   Scene scene;
-  scene.add({0.5f, -0.25f, 2}, {0.05f, 0, 0, 0, 0.05f, 0, 0, 0, 0}, 1, {tests::dc_of(1), tests::dc_of(1), tests::dc_of(1)});
+  scene.add({0.5f, -0.25f, 2}, {0.05f, 0, 0, 0, 0.05f, 0, 0, 0, 0}, 1,
+            {tests::dc_of(1), tests::dc_of(1), tests::dc_of(1)});
   const FloatImage image = render(scene, front_camera(96, 96, 120));
   LargestError error("alpha of an off-axis disc");
   const double mean_x = 120 * 0.25 + 48, mean_y = -120 * 0.125 + 48;
   for (uint32_t y = 0; y < 96; ++y) {
     for (uint32_t x = 0; x < 96; ++x) {
-      const double alpha = std::min(double(kAlphaMax), weight(0.05f, 2, 120, x + 0.5 - mean_x, y + 0.5 - mean_y));
+      const double alpha =
+          std::min(double(kAlphaMax), weight(0.05f, 2, 120, x + 0.5 - mean_x, y + 0.5 - mean_y));
       if (std::abs(alpha - kAlphaCut) < 1e-6) continue;
       error.add(image.at(x, y)[3], alpha < kAlphaCut ? 0 : alpha);
     }
@@ -72,7 +78,8 @@ TEST(SplatClosedForm, TwoGaussiansBlendFrontToBack) {
   for (uint32_t y = 0; y < 32; ++y) {
     for (uint32_t x = 0; x < 32; ++x) {
       const double dx = x + 0.5 - 16, dy = y + 0.5 - 16;
-      const double front = 0.6f * weight(0.3f, 2, 100, dx, dy), back = 0.9f * weight(0.45f, 3, 100, dx, dy);
+      const double front = 0.6f * weight(0.3f, 2, 100, dx, dy),
+                   back = 0.9f * weight(0.45f, 3, 100, dx, dy);
       ASSERT_GT(std::min(front, back), kAlphaCut);
       const std::array<float, 4> pixel = image.at(x, y);
       const double alpha = 1 - (1 - front) * (1 - back);
@@ -86,7 +93,8 @@ TEST(SplatClosedForm, TwoGaussiansBlendFrontToBack) {
 }
 
 TEST(SplatClosedForm, OpaqueStopsAtTheFirst) {
-  // Alpha is clamped to 0.99; a second such layer would leave 1e-4 - 2e-9 of the light, so the pixel stops before it.
+  // Alpha is clamped to 0.99; a second such layer would leave 1e-4 - 2e-9 of the light, so the
+  // pixel stops before it.
   Scene scene;
   scene.add_ball({0, 0, 2}, 0.5f, 1, {0.25f, 0.5f, 0.75f});
   scene.add_ball({0, 0, 3}, 0.5f, 1, {1, 1, 1});
@@ -99,7 +107,8 @@ TEST(SplatClosedForm, OpaqueStopsAtTheFirst) {
 }
 
 TEST(SplatClosedForm, AStoppedPixelStaysStopped) {
-  // Alpha 0.99, then 0.995-like (stops), then a faint one that alone would not have taken the light below 1e-4.
+  // Alpha 0.99, then 0.995-like (stops), then a faint one that alone would not have taken the light
+  // below 1e-4.
   Scene scene;
   scene.add_ball({0, 0, 2}, 0.5f, 1, {0, 0, 0});
   scene.add_ball({0, 0, 3}, 0.5f, 1, {0, 0, 0});
@@ -174,9 +183,11 @@ TEST(SplatClosedForm, AGaussianSmallerThanAPixelIsTheDilation) {
 }
 
 TEST(SplatClosedForm, AGaussianLargerThanTheScreenIsConstant) {
-  // 1 km wide before a small camera: 5e7 pixels of deviation, so the weight is 1 to 1e-11 everywhere.
+  // 1 km wide before a small camera: 5e7 pixels of deviation, so the weight is 1 to 1e-11
+  // everywhere.
   Scene scene;
-  scene.add({0, 0, 2}, {1000, 0, 0, 0, 1000, 0, 0, 0, 0}, 0.5f, {tests::dc_of(0.5f), tests::dc_of(0.5f), tests::dc_of(0.5f)});
+  scene.add({0, 0, 2}, {1000, 0, 0, 0, 1000, 0, 0, 0, 0}, 0.5f,
+            {tests::dc_of(0.5f), tests::dc_of(0.5f), tests::dc_of(0.5f)});
   const FloatImage image = render(scene, front_camera(100, 70, 100));
   for (size_t i = 0; i < image.rgba.size(); i += 4) {
     ASSERT_NEAR(image.rgba[i + 3], 0.5, 1e-6);
@@ -185,27 +196,31 @@ TEST(SplatClosedForm, AGaussianLargerThanTheScreenIsConstant) {
 }
 
 TEST(SplatClosedForm, ANeedleDoesNotBreak) {
-  // 1 m by 0 by 0 along the diagonal: 100,000 pixels long at this focal length, dilation alone across. Across, the variance is exactly the
-  // dilation.
+  // 1 m by 0 by 0 along the diagonal: 100,000 pixels long at this focal length, dilation alone
+  // across. Across, the variance is exactly the dilation.
   Scene scene;
   const float s = 1.0f / std::sqrt(2.0f);
-  scene.add({0, 0, 1}, {s, 0, 0, s, 0, 0, 0, 0, 0}, 0.9f, {tests::dc_of(1), tests::dc_of(1), tests::dc_of(1)});
+  scene.add({0, 0, 1}, {s, 0, 0, s, 0, 0, 0, 0, 0}, 0.9f,
+            {tests::dc_of(1), tests::dc_of(1), tests::dc_of(1)});
   const FloatImage image = render(scene, front_camera(64, 64, 100000));
   LargestError error("alpha of a needle");
   for (uint32_t y = 0; y < 64; ++y) {
     for (uint32_t x = 0; x < 64; ++x) {
-      const double along = (x + 0.5 - 32 + y + 0.5 - 32) / std::sqrt(2.0), across = (x - double(y)) / std::sqrt(2.0);
+      const double along = (x + 0.5 - 32 + y + 0.5 - 32) / std::sqrt(2.0),
+                   across = (x - double(y)) / std::sqrt(2.0);
       const double alpha = 0.9f * std::exp(-0.5 * (across * across / 0.3 + along * along / 1e10));
       error.add(image.at(x, y)[3], alpha < kAlphaCut ? 0 : alpha);
     }
   }
-  EXPECT_LE(error.largest(), 2e-6) << "the row's centre is a float of about 32 pixels: 2e-6 px over a deviation of 0.55 px";
+  EXPECT_LE(error.largest(), 2e-6)
+      << "the row's centre is a float of about 32 pixels: 2e-6 px over a deviation of 0.55 px";
 }
 
 TEST(SplatClosedForm, ExtremesOfOpacity) {
   const Camera camera = front_camera(33, 33, 50);
   for (const float opacity :
-       {0.0f, std::nextafter(kAlphaCut, 0.0f), -1.0f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+       {0.0f, std::nextafter(kAlphaCut, 0.0f), -1.0f, std::numeric_limits<float>::quiet_NaN(),
+        std::numeric_limits<float>::infinity()}) {
     Scene scene;
     scene.add_ball({0, 0, 2}, 0.2f, opacity, {1, 1, 1});
     EXPECT_EQ(render(scene, camera).at(16, 16)[3], 0) << opacity;
@@ -218,7 +233,8 @@ TEST(SplatClosedForm, ExtremesOfOpacity) {
 }
 
 TEST(SplatClosedForm, WhatIsNotFiniteIsLeftOutOneByOne) {
-  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              inf = std::numeric_limits<float>::infinity();
   Scene clean;
   clean.add_ball({0, 0, 2}, 0.1f, 0.8f, {0.2f, 0.4f, 0.6f});
   Scene dirty;
@@ -252,7 +268,8 @@ TEST(SplatClosedForm, WhatIsNotFiniteIsLeftOutOneByOne) {
 TEST(SplatClosedForm, AHundredThousandTransparentLayers) {
   // Alpha 0.004 each, equal colour: 1 - 0.996^n, until the light falls below 1e-4 at layer 2,299.
   Scene scene;
-  for (uint32_t i = 0; i < 100000; ++i) scene.add_ball({0, 0, 2.0f + 1e-5f * static_cast<float>(i)}, 5, 0.004f, {0.5f, 0.5f, 0.5f});
+  for (uint32_t i = 0; i < 100000; ++i)
+    scene.add_ball({0, 0, 2.0f + 1e-5f * static_cast<float>(i)}, 5, 0.004f, {0.5f, 0.5f, 0.5f});
   const std::array<float, 4> centre = render(scene, front_camera(5, 5, 100)).at(2, 2);
   EXPECT_NEAR(centre[3], 1 - 1e-4, 2e-6);
   EXPECT_LE(centre[3], 1 - 1e-4f);
@@ -262,12 +279,14 @@ TEST(SplatClosedForm, AHundredThousandTransparentLayers) {
 TEST(SplatClosedForm, AThinLineOfLayersKeepsItsSum) {
   // Fewer layers than the stop: 500 of alpha 0.01 leave 0.99^500 of the light.
   Scene scene;
-  for (uint32_t i = 0; i < 500; ++i) scene.add_ball({0, 0, 2.0f + 1e-3f * static_cast<float>(i)}, 50, 0.01f, {1, 1, 1});
+  for (uint32_t i = 0; i < 500; ++i)
+    scene.add_ball({0, 0, 2.0f + 1e-3f * static_cast<float>(i)}, 50, 0.01f, {1, 1, 1});
   EXPECT_NEAR(render(scene, front_camera(3, 3, 100)).at(1, 1)[3], 1 - std::pow(0.99, 500), 3e-6);
 }
 
 TEST(SplatClosedForm, FarFromTheOriginOnlyTheViewMatters) {
-  // The same scene 1,000 m away. Positions there are multiples of 6e-5 m: at 100 px / 2 m that is 0.003 px.
+  // The same scene 1,000 m away. Positions there are multiples of 6e-5 m: at 100 px / 2 m that is
+  // 0.003 px.
   Scene here, there;
   here.add_ball({0.25f, 0, 2}, 0.125f, 0.8f, {1, 1, 1});
   there.add_ball({1000.25f, 0, 2}, 0.125f, 0.8f, {1, 1, 1});
@@ -289,7 +308,8 @@ TEST(SplatClosedForm, FieldsOfViewOf1And170Degrees) {
     LargestError error(fov_deg == 1.0f ? "alpha at 1 degree" : "alpha at 170 degrees");
     for (uint32_t x = 0; x < 64; ++x) {
       const double dx = x + 0.5 - 32, alpha = 0.8f * std::exp(-0.5 * (dx * dx + 0.25) / 25.3);
-      if (std::abs(alpha - kAlphaCut) > 1e-6) error.add(image.at(x, 32)[3], alpha < kAlphaCut ? 0 : alpha);
+      if (std::abs(alpha - kAlphaCut) > 1e-6)
+        error.add(image.at(x, 32)[3], alpha < kAlphaCut ? 0 : alpha);
     }
     EXPECT_LE(error.largest(), 2e-6);
   }

@@ -1,5 +1,5 @@
-// The renderer against the float64 brute-force oracle, which shares no code with it: random clouds, off-centre principal points, every SH
-// degree.
+// The renderer against the float64 brute-force oracle, which shares no code with it: random clouds,
+// off-centre principal points, every SH degree.
 #include "oracle/splat_oracle.h"
 
 #include <gtest/gtest.h>
@@ -20,12 +20,15 @@ using tests::Scene;
 struct Comparison {
   double foreground_psnr_db = 0;
   double largest = 0;
-  double beyond = 0;  // share of pixels whose error only a contribution taken on one side alone explains
+  double beyond =
+      0;  // share of pixels whose error only a contribution taken on one side alone explains
 };
 
-Comparison compare(const Scene& scene, const Camera& camera, const char* what, double alpha_cut = kAlphaCut) {
+Comparison compare(const Scene& scene, const Camera& camera, const char* what,
+                   double alpha_cut = kAlphaCut) {
   const FloatImage image = tests::render(scene, camera, static_cast<float>(alpha_cut));
-  const oracle::Image truth = oracle::render(oracle::from_view(scene.view()), camera, {.alpha_cut = alpha_cut});
+  const oracle::Image truth =
+      oracle::render(oracle::from_view(scene.view()), camera, {.alpha_cut = alpha_cut});
   std::vector<float> premultiplied = image.rgba;
   for (size_t i = 0; i < premultiplied.size(); i += 4) {
     for (int c = 0; c < 3; ++c) premultiplied[i + c] *= premultiplied[i + 3];
@@ -36,19 +39,22 @@ Comparison compare(const Scene& scene, const Camera& camera, const char* what, d
   size_t flipped = 0;
   for (size_t p = 0; p < truth.transmittance.size(); ++p) {
     double largest = std::abs(premultiplied[4 * p + 3] - truth.alpha(p));
-    for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(premultiplied[4 * p + c] - truth.rgb[3 * p + c]));
+    for (int c = 0; c < 3; ++c)
+      largest = std::max(largest, std::abs(premultiplied[4 * p + c] - truth.rgb[3 * p + c]));
     error.add(largest);
     flipped += largest > 1e-4;
   }
   comparison.largest = error.largest();
-  comparison.beyond = static_cast<double>(flipped) / static_cast<double>(truth.transmittance.size());
-  std::printf("%s: foreground PSNR %.1f dB, %.2g of the pixels differ by more than 1e-4\n", what, comparison.foreground_psnr_db,
-              comparison.beyond);
+  comparison.beyond =
+      static_cast<double>(flipped) / static_cast<double>(truth.transmittance.size());
+  std::printf("%s: foreground PSNR %.1f dB, %.2g of the pixels differ by more than 1e-4\n", what,
+              comparison.foreground_psnr_db, comparison.beyond);
   return comparison;
 }
 
-// A contribution at the cut (1/255) may be taken on one side and not on the other: the error is then up to 1/255 times a colour of up to 3
-// or so. Everything else is float rounding. Such flips are rare, which the share of pixels asserts.
+// A contribution at the cut (1/255) may be taken on one side and not on the other: the error is
+// then up to 1/255 times a colour of up to 3 or so. Everything else is float rounding. Such flips
+// are rare, which the share of pixels asserts.
 void expect_close(const Comparison& comparison) {
   EXPECT_GE(comparison.foreground_psnr_db, 100);
   EXPECT_LE(comparison.largest, 3.0 / 255);
@@ -58,12 +64,14 @@ void expect_close(const Comparison& comparison) {
 TEST(SplatOracle, EveryShDegree) {
   for (uint32_t degree = 0; degree <= 3; ++degree) {
     const std::string what = "2,000 Gaussians, SH degree " + std::to_string(degree);
-    expect_close(compare(make_random_scene(2000, degree, 10 + degree), tests::front_camera(160, 120, 130), what.c_str()));
+    expect_close(compare(make_random_scene(2000, degree, 10 + degree),
+                         tests::front_camera(160, 120, 130), what.c_str()));
   }
 }
 
 TEST(SplatOracle, TwentyThousandGaussians) {
-  expect_close(compare(make_random_scene(20000, 3, 20), tests::front_camera(256, 256, 220), "20,000 Gaussians, SH degree 3"));
+  expect_close(compare(make_random_scene(20000, 3, 20), tests::front_camera(256, 256, 220),
+                       "20,000 Gaussians, SH degree 3"));
 }
 
 TEST(SplatOracle, OffCentrePrincipalPointAndUnequalFocals) {
@@ -75,8 +83,12 @@ TEST(SplatOracle, OffCentrePrincipalPointAndUnequalFocals) {
 }
 
 TEST(SplatOracle, TurnedAndMovedCamera) {
-  const Result<Camera> camera = make_orbit_camera(
-      {.azimuth_deg = 130, .elevation_deg = 35, .distance_m = 3, .vertical_fov_deg = 60, .target_m = {0, 0.2f, 3}}, 140, 140);
+  const Result<Camera> camera = make_orbit_camera({.azimuth_deg = 130,
+                                                   .elevation_deg = 35,
+                                                   .distance_m = 3,
+                                                   .vertical_fov_deg = 60,
+                                                   .target_m = {0, 0.2f, 3}},
+                                                  140, 140);
   ASSERT_TRUE(camera.ok());
   expect_close(compare(make_random_scene(4000, 3, 40), *camera, "orbit camera inside the cloud"));
 }
@@ -84,7 +96,8 @@ TEST(SplatOracle, TurnedAndMovedCamera) {
 TEST(SplatOracle, OtherAlphaCuts) {
   for (const float cut : {1.0f / 16, 1e-3f}) {
     const std::string what = "alpha cut " + std::to_string(cut);
-    const Comparison comparison = compare(make_random_scene(2000, 0, 50), tests::front_camera(128, 128, 110), what.c_str(), cut);
+    const Comparison comparison = compare(make_random_scene(2000, 0, 50),
+                                          tests::front_camera(128, 128, 110), what.c_str(), cut);
     EXPECT_LE(comparison.largest, 3 * cut + 1e-4);
     EXPECT_LE(comparison.beyond, 1e-3);
   }
@@ -94,18 +107,21 @@ TEST(SplatOracle, ImageSizesThatAreNoMultipleOfATile) {
   for (const uint32_t size : {1u, 31u, 33u, 65u}) {
     const std::string what = std::to_string(size) + " pixels a side";
     const Comparison comparison =
-        compare(make_random_scene(500, 0, 60 + size), tests::front_camera(size, size, 0.8f * static_cast<float>(size)), what.c_str());
+        compare(make_random_scene(500, 0, 60 + size),
+                tests::front_camera(size, size, 0.8f * static_cast<float>(size)), what.c_str());
     EXPECT_LE(comparison.largest, 3.0 / 255);
   }
 }
 
 TEST(SplatOracle, TheCropOfAnImageIsThatPartOfIt) {
-  // Moving the principal point by whole tiles or by 7 pixels shifts the picture; up to the Jacobian's clamp nothing else may change.
+  // Moving the principal point by whole tiles or by 7 pixels shifts the picture; up to the
+  // Jacobian's clamp nothing else may change.
   Scene scene;
   tests::Random random(70);
   for (int i = 0; i < 300; ++i) {
-    scene.add_ball({random.uniform(-0.5f, 0.5f), random.uniform(-0.5f, 0.5f), random.uniform(2, 3)}, random.uniform(0.005f, 0.05f),
-                   random.uniform(0.1f, 1), {random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)});
+    scene.add_ball({random.uniform(-0.5f, 0.5f), random.uniform(-0.5f, 0.5f), random.uniform(2, 3)},
+                   random.uniform(0.005f, 0.05f), random.uniform(0.1f, 1),
+                   {random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)});
   }
   const Camera whole = tests::front_camera(128, 128, 128);
   const FloatImage full = tests::render(scene, whole);
@@ -118,7 +134,8 @@ TEST(SplatOracle, TheCropOfAnImageIsThatPartOfIt) {
     for (uint32_t y = 0; y < 128; ++y) {
       for (uint32_t x = 0; x < 64; ++x) {
         for (int c = 0; c < 4; ++c)
-          error.add(crop.at(x, y)[c] * (c < 3 ? crop.at(x, y)[3] : 1), full.at(x + shift, y)[c] * (c < 3 ? full.at(x + shift, y)[3] : 1));
+          error.add(crop.at(x, y)[c] * (c < 3 ? crop.at(x, y)[3] : 1),
+                    full.at(x + shift, y)[c] * (c < 3 ? full.at(x + shift, y)[3] : 1));
       }
     }
     EXPECT_LE(error.largest(), 1.5 / 255) << "a flip at the cut at most";

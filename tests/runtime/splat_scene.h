@@ -1,4 +1,5 @@
-// Gaussian sets for the splatting tests, with the storage behind their views, and a renderer without avatars.
+// Gaussian sets for the splatting tests, with the storage behind their views, and a renderer
+// without avatars.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,15 +21,18 @@ struct Scene {
   uint32_t sh_degree = 0;
   std::vector<float> position, factor, opacity, sh;
 
-  void add(std::array<float, 3> place, std::array<float, 9> f, float o, std::vector<float> coefficients) {
+  void add(std::array<float, 3> place, std::array<float, 9> f, float o,
+           std::vector<float> coefficients) {
     position.insert(position.end(), place.begin(), place.end());
     factor.insert(factor.end(), f.begin(), f.end());
     opacity.push_back(o);
     sh.insert(sh.end(), coefficients.begin(), coefficients.end());
   }
   // An isotropic Gaussian of one colour.
-  void add_ball(std::array<float, 3> place, float deviation_m, float o, std::array<float, 3> colour) {
-    add(place, {deviation_m, 0, 0, 0, deviation_m, 0, 0, 0, deviation_m}, o, {dc_of(colour[0]), dc_of(colour[1]), dc_of(colour[2])});
+  void add_ball(std::array<float, 3> place, float deviation_m, float o,
+                std::array<float, 3> colour) {
+    add(place, {deviation_m, 0, 0, 0, deviation_m, 0, 0, 0, deviation_m}, o,
+        {dc_of(colour[0]), dc_of(colour[1]), dc_of(colour[2])});
   }
   GaussianView view() const {
     return {.count = static_cast<uint32_t>(opacity.size()),
@@ -66,21 +70,26 @@ inline std::unique_ptr<Renderer> make_renderer(uint32_t threads = 1) {
 }
 
 inline FloatImage render(Renderer& renderer, const Frame& frame) {
-  FloatImage image{.width = frame.camera.width_px,
-                   .rgba = std::vector<float>(size_t(frame.camera.width_px) * frame.camera.height_px * 4, NAN)};
-  const Status status =
-      renderer.render(frame, {.pixels = image.rgba.data(), .stride_bytes = size_t(16) * image.width, .format = PixelFormat::kRgbaF32});
+  FloatImage image{
+      .width = frame.camera.width_px,
+      .rgba = std::vector<float>(size_t(frame.camera.width_px) * frame.camera.height_px * 4, NAN)};
+  const Status status = renderer.render(frame, {.pixels = image.rgba.data(),
+                                                .stride_bytes = size_t(16) * image.width,
+                                                .format = PixelFormat::kRgbaF32});
   EXPECT_TRUE(status.ok()) << status.message();
   return image;
 }
 
-inline FloatImage render(const Scene& scene, const Camera& camera, float alpha_cut = kAlphaCut, uint32_t threads = 1) {
+inline FloatImage render(const Scene& scene, const Camera& camera, float alpha_cut = kAlphaCut,
+                         uint32_t threads = 1) {
   const std::unique_ptr<Renderer> renderer = make_renderer(threads);
   const GaussianView view = scene.view();
-  return render(*renderer, {.camera = camera, .gaussians = {&view, 1}, .splat = {.alpha_cut = alpha_cut}});
+  return render(*renderer,
+                {.camera = camera, .gaussians = {&view, 1}, .splat = {.alpha_cut = alpha_cut}});
 }
 
-// A random cloud before the front camera: discs, needles and balls, all orientations, some partly outside the image.
+// A random cloud before the front camera: discs, needles and balls, all orientations, some partly
+// outside the image.
 Scene make_random_scene(uint32_t count, uint32_t sh_degree, uint64_t seed);
 
 }  // namespace figurine::tests

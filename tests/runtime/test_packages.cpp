@@ -11,7 +11,9 @@
 namespace figurine::tests {
 namespace {
 
-Provenance provenance() { return {.tool = "figurine-tests 1", .licence_name = "CC0-1.0", .depicted_person = "synthetic"}; }
+Provenance provenance() {
+  return {.tool = "figurine-tests 1", .licence_name = "CC0-1.0", .depicted_person = "synthetic"};
+}
 
 std::unique_ptr<Package> open(const AlignedBytes& bytes, const char* name) {
   Result<Package> package = Package::open(bytes.bytes(), name);
@@ -32,8 +34,10 @@ std::vector<float> network_input(const Avatar& avatar, const Body& body) {
 
 }  // namespace
 
-AlignedBytes::AlignedBytes(std::span<const std::byte> bytes) : storage_(bytes.size() + kBlobAlignment), size_(bytes.size()) {
-  offset_ = (kBlobAlignment - reinterpret_cast<uintptr_t>(storage_.data()) % kBlobAlignment) % kBlobAlignment;
+AlignedBytes::AlignedBytes(std::span<const std::byte> bytes)
+    : storage_(bytes.size() + kBlobAlignment), size_(bytes.size()) {
+  offset_ = (kBlobAlignment - reinterpret_cast<uintptr_t>(storage_.data()) % kBlobAlignment) %
+            kBlobAlignment;
   std::memcpy(storage_.data() + offset_, bytes.data(), bytes.size());
 }
 
@@ -66,7 +70,8 @@ SyntheticBody make_test_body(const SyntheticBodyOptions& options) {
     joint_position.insert(joint_position.end(), place, place + 3);
   }
 
-  // The chart covers all but three texels at each side: two for the border's dilation, one that stays empty.
+  // The chart covers all but three texels at each side: two for the border's dilation, one that
+  // stays empty.
   constexpr uint32_t kMargin = 3;
   std::vector<uint32_t> texel, border_texel, border_source;
   std::vector<float> position, normal, weights, spacing;
@@ -76,20 +81,25 @@ SyntheticBody make_test_body(const SyntheticBodyOptions& options) {
     for (uint32_t u = kMargin; u < size - kMargin; ++u) {
       texel.push_back(v * size + u);
       const double angle = 2 * kPi * (u - kMargin + 0.5) / side;
-      const float out[3] = {static_cast<float>(std::sin(angle)), 0, static_cast<float>(std::cos(angle))};
-      const float y = kHeight * (1.0f - (static_cast<float>(v - kMargin) + 0.5f) / static_cast<float>(side));
+      const float out[3] = {static_cast<float>(std::sin(angle)), 0,
+                            static_cast<float>(std::cos(angle))};
+      const float y =
+          kHeight * (1.0f - (static_cast<float>(v - kMargin) + 0.5f) / static_cast<float>(side));
       const float place[3] = {kRadius * out[0], y, kRadius * out[2]};
       position.insert(position.end(), place, place + 3);
       normal.insert(normal.end(), out, out + 3);
       // Between the two joints around it, linearly.
-      const float along = std::min(y / kHeight * static_cast<float>(joints), static_cast<float>(joints) - 1.001f);
+      const float along =
+          std::min(y / kHeight * static_cast<float>(joints), static_cast<float>(joints) - 1.001f);
       const uint32_t below = static_cast<uint32_t>(along);
       const float part = along - static_cast<float>(below);
-      const uint8_t who[kSkinInfluences] = {static_cast<uint8_t>(below), static_cast<uint8_t>(std::min(below + 1, joints - 1))};
+      const uint8_t who[kSkinInfluences] = {static_cast<uint8_t>(below),
+                                            static_cast<uint8_t>(std::min(below + 1, joints - 1))};
       const float share[kSkinInfluences] = {1 - part, part};
       influences.insert(influences.end(), who, who + kSkinInfluences);
       weights.insert(weights.end(), share, share + kSkinInfluences);
-      spacing.push_back(std::max(kHeight, 2 * static_cast<float>(kPi) * kRadius) / static_cast<float>(side));
+      spacing.push_back(std::max(kHeight, 2 * static_cast<float>(kPi) * kRadius) /
+                        static_cast<float>(side));
     }
   }
   for (uint32_t v = kMargin - 2; v < size - kMargin + 2; ++v) {
@@ -101,7 +111,8 @@ SyntheticBody make_test_body(const SyntheticBodyOptions& options) {
       border_source.push_back((near_v - kMargin) * side + (near_u - kMargin));
     }
   }
-  std::vector<float> joint_basis(size_t(shapes) * joints * 3), texel_basis(size_t(shapes) * position.size());
+  std::vector<float> joint_basis(size_t(shapes) * joints * 3),
+      texel_basis(size_t(shapes) * position.size());
   for (float& value : joint_basis) value = 0.02f * random.uniform(-1, 1);
   for (float& value : texel_basis) value = 0.02f * random.uniform(-1, 1);
 
@@ -135,8 +146,8 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
   avatar.shape = options.shape;
   avatar.fourier_octaves = options.fourier_octaves;
   avatar.decoding.sh_degree = options.sh_degree;
-  avatar.network =
-      make_pose_unet(body.body().uv_size, kMapChannels + 4 * options.fourier_octaves, options.channels, head_channels(options.sh_degree));
+  avatar.network = make_pose_unet(body.body().uv_size, kMapChannels + 4 * options.fourier_octaves,
+                                  options.channels, head_channels(options.sh_degree));
 
   const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, false);
   FIG_CHECK(shapes.ok(), shapes.status().message().c_str());
@@ -151,7 +162,8 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
     for (float& weight : weights) weight = deviation * random.normal();
     for (float& value : bias) value = 0.05f * random.normal();
     if (is_head) {
-      for (int c = 0; c < 3; ++c) bias[11 + c] = options.colour.empty() ? random.uniform(-1, 1) : options.colour[c];
+      for (int c = 0; c < 3; ++c)
+        bias[11 + c] = options.colour.empty() ? random.uniform(-1, 1) : options.colour[c];
     }
     storage.push_back(std::move(weights));
     layer.weights = storage.back();
@@ -160,7 +172,8 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
   }
   std::unique_ptr<QuantisedNetwork> quantised;
   if (options.held != Held::kFloat32) {
-    quantised = std::make_unique<QuantisedNetwork>(avatar.network, network_input(avatar, body.body()));
+    quantised =
+        std::make_unique<QuantisedNetwork>(avatar.network, network_input(avatar, body.body()));
     avatar.fixed_point = quantised->fixed;
   }
   if (options.held == Held::kFixedPoint) {
@@ -170,8 +183,9 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
   avatar.golden.rotations = rest.rotations;
   avatar.golden.camera = make_test_camera(64, 64);
 
-  const Budget budget{
-      .peak_memory_bytes = 64 << 20, .macs_per_frame = count_macs(avatar.network, *shapes), .gaussians = body.body().texel_count()};
+  const Budget budget{.peak_memory_bytes = 64 << 20,
+                      .macs_per_frame = count_macs(avatar.network, *shapes),
+                      .gaussians = body.body().texel_count()};
   const Result<std::vector<std::byte>> written = write_package(avatar, budget, provenance());
   FIG_CHECK(written.ok(), written.status().message().c_str());
   SyntheticAvatar result{.bytes = AlignedBytes(*written), .package = nullptr};
@@ -182,18 +196,24 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
 SyntheticPose make_test_pose(const Body& body, uint32_t frame) {
   SyntheticPose pose;
   for (uint32_t j = 0; j < body.joint_count(); ++j) {
-    const float bend = frame == 0 ? 0.0f : 0.15f * static_cast<float>((frame * 7 + j * 3) % 5) - 0.3f;
+    const float bend =
+        frame == 0 ? 0.0f : 0.15f * static_cast<float>((frame * 7 + j * 3) % 5) - 0.3f;
     const float wxyz[4] = {1, j % 2 == 0 ? bend : 0, 0.5f * bend, j % 2 == 1 ? bend : 0};
     pose.rotations.insert(pose.rotations.end(), wxyz, wxyz + 4);
   }
-  if (frame > 0) pose.root_translation_m = {0.05f * static_cast<float>(frame % 3), 0, 0.02f * static_cast<float>(frame % 5)};
+  if (frame > 0)
+    pose.root_translation_m = {0.05f * static_cast<float>(frame % 3), 0,
+                               0.02f * static_cast<float>(frame % 5)};
   return pose;
 }
 
 Camera make_test_camera(uint32_t width_px, uint32_t height_px, float azimuth_deg) {
-  const Result<Camera> camera = make_orbit_camera(
-      {.azimuth_deg = azimuth_deg, .elevation_deg = 5, .distance_m = 2.5f, .vertical_fov_deg = 45, .target_m = {0, 0.8f, 0}}, width_px,
-      height_px);
+  const Result<Camera> camera = make_orbit_camera({.azimuth_deg = azimuth_deg,
+                                                   .elevation_deg = 5,
+                                                   .distance_m = 2.5f,
+                                                   .vertical_fov_deg = 45,
+                                                   .target_m = {0, 0.8f, 0}},
+                                                  width_px, height_px);
   FIG_CHECK(camera.ok(), camera.status().message().c_str());
   return *camera;
 }

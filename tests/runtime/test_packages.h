@@ -1,6 +1,8 @@
-// Small synthetic bodies and avatars in memory: a jointed cylinder and a UNet of random weights, written and opened as packages.
+// Small synthetic bodies and avatars in memory: a jointed cylinder and a UNet of random weights,
+// written and opened as packages.
 //
-// Everything follows from the sizes and the seed; no libm distribution is involved, so the bytes are the same on every machine.
+// Everything follows from the sizes and the seed; no libm distribution is involved, so the bytes
+// are the same on every machine.
 #pragma once
 
 #include <cstddef>
@@ -58,7 +60,8 @@ struct SyntheticAvatarOptions {
   uint32_t fourier_octaves = 1;
   TemplateMode template_mode = TemplateMode::kShaped;
   std::vector<float> shape = {0.5f, -0.5f};
-  std::vector<float> colour = {};  // empty: a random one per avatar; otherwise the head's mean colour
+  std::vector<float> colour =
+      {};  // empty: a random one per avatar; otherwise the head's mean colour
   uint64_t seed = 1;
   Held held = Held::kFloat32;
   std::string name = "test avatar";
@@ -70,7 +73,8 @@ struct SyntheticAvatar {
 };
 
 SyntheticBody make_test_body(const SyntheticBodyOptions& options = {});
-SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvatarOptions& options = {});
+SyntheticAvatar make_test_avatar(const SyntheticBody& body,
+                                 const SyntheticAvatarOptions& options = {});
 
 // A pose with moderately bent joints; frame 0 is the rest pose.
 struct SyntheticPose {

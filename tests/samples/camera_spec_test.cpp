@@ -6,7 +6,8 @@
 namespace figurine::samples {
 namespace {
 
-constexpr const char* kSound = R"({"width": 640, "height": 480, "intrinsics": [[500, 0, 320], [0, 510, 240], [0, 0, 1]],
+constexpr const char* kSound =
+    R"({"width": 640, "height": 480, "intrinsics": [[500, 0, 320], [0, 510, 240], [0, 0, 1]],
   "world_to_camera": [[1, 0, 0, 0.5], [0, -1, 0, 1], [0, 0, -1, 3]], "near": 0.05})";
 
 TEST(CameraSpec, ReadsAnOrbit) {
@@ -22,8 +23,9 @@ TEST(CameraSpec, ReadsAnOrbit) {
 }
 
 TEST(CameraSpec, RefusesUnsoundOrbits) {
-  for (const char* text : {"orbit:", "orbit:1,2", "orbit:1,2,3,4,5", "orbit:a,2,3", "orbit:0,90,2", "orbit:0,0,0", "orbit:0,0,-1",
-                           "orbit:0,0,1,0.5", "orbit:0,0,1,171", "orbit:nan,0,1", "orbit:0,0,inf"}) {
+  for (const char* text :
+       {"orbit:", "orbit:1,2", "orbit:1,2,3,4,5", "orbit:a,2,3", "orbit:0,90,2", "orbit:0,0,0",
+        "orbit:0,0,-1", "orbit:0,0,1,0.5", "orbit:0,0,1,171", "orbit:nan,0,1", "orbit:0,0,inf"}) {
     EXPECT_FALSE(parse_camera_spec(text).ok()) << text;
   }
 }
@@ -57,8 +59,10 @@ TEST(CameraJson, NamesTheFieldThatIsWrong) {
     text.replace(at, std::string(from).size(), to);
     const Result<Camera> camera = parse_camera_json(text, "c.json");
     ASSERT_FALSE(camera.ok()) << text;
-    EXPECT_NE(camera.status().message().find("c.json"), std::string::npos) << camera.status().message();
-    EXPECT_NE(camera.status().message().find(field), std::string::npos) << camera.status().message();
+    EXPECT_NE(camera.status().message().find("c.json"), std::string::npos)
+        << camera.status().message();
+    EXPECT_NE(camera.status().message().find(field), std::string::npos)
+        << camera.status().message();
   };
   expect("640", "0", "width");
   expect("640", "1e9", "width");

@@ -1,4 +1,5 @@
-// The program from the outside: what it writes on sound input, and that bad input gets one line, the right exit code and no file.
+// The program from the outside: what it writes on sound input, and that bad input gets one line,
+// the right exit code and no file.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -34,7 +35,8 @@ class Cli : public testing::Test {
 
   // Runs in an empty folder; P/ in the arguments is the folder of the packages.
   ProgramRun run(std::string arguments, RunOptions options = {}) {
-    // At the beginning of a word only, and on behind what was put in: a folder's random name may end in P itself.
+    // At the beginning of a word only, and on behind what was put in: a folder's random name may
+    // end in P itself.
     const std::string packages = packages_->path() + "/";
     for (size_t at = 0; (at = arguments.find("P/", at)) != std::string::npos;) {
       const bool word = at == 0 || arguments[at - 1] == ' ';
@@ -45,7 +47,8 @@ class Cli : public testing::Test {
     return run_figurine(arguments, options);
   }
 
-  void expect_refused(const std::string& arguments, int exit_code, const std::string& reason, const RunOptions& options = {}) {
+  void expect_refused(const std::string& arguments, int exit_code, const std::string& reason,
+                      const RunOptions& options = {}) {
     const ProgramRun result = run(arguments, options);
     EXPECT_EQ(result.exit_code, exit_code) << arguments << "\n" << result.err;
     EXPECT_EQ(result.error_lines(), 1u) << arguments << "\n" << result.err;
@@ -100,23 +103,32 @@ TEST_F(Cli, RendersMembersOfAPopulationByNameAndByNumber) {
   EXPECT_EQ(folder_.read("a.pfm"), folder_.read("b.pfm"));
   ASSERT_EQ(run("render P/people.fgn#ada --size 64x64 -o c.pfm").exit_code, 0);
   EXPECT_NE(folder_.read("a.pfm"), folder_.read("c.pfm"));
-  ASSERT_EQ(run("render P/people.fgn#ada P/people.fgn#bob P/avatar.fgn --motion P/motion.fgn --size 64x48 -o d.png").exit_code, 0);
+  ASSERT_EQ(run("render P/people.fgn#ada P/people.fgn#bob P/avatar.fgn --motion P/motion.fgn "
+                "--size 64x48 -o d.png")
+                .exit_code,
+            0);
   ASSERT_EQ(run("export P/people.fgn#0 -o x.ply").exit_code, 0);
   ASSERT_EQ(run("bench P/people.fgn#ada --frames 2 --size 32x32 --json -").exit_code, 0);
 }
 
 TEST_F(Cli, SaysWhatIsWrongWithAMember) {
-  expect_refused("render P/people.fgn -o x.png", 1, "people.fgn: is a population: name one of its 2 members");
+  expect_refused("render P/people.fgn -o x.png", 1,
+                 "people.fgn: is a population: name one of its 2 members");
   expect_refused("render P/people.fgn#2 -o x.png", 1,
-                 "people.fgn: member '2': there is none of this name, and its 2 members have the numbers 0 to 1");
+                 "people.fgn: member '2': there is none of this name, and its 2 members have the "
+                 "numbers 0 to 1");
   expect_refused("export P/people.fgn#zoe -o x.ply", 1, "member 'zoe'");
   expect_refused("bench P/people.fgn#", 1, "member ''");
-  expect_refused("render P/avatar.fgn#0 -o x.png", 1, "avatar.fgn: member '0': a package of kind avatar has no members");
+  expect_refused("render P/avatar.fgn#0 -o x.png", 1,
+                 "avatar.fgn: member '0': a package of kind avatar has no members");
   expect_refused("render P/body.fgn#0 -o x.png", 1, "kind body has no members");
   expect_refused("render P/nobody.fgn#0 -o x.png", 1, "nobody.fgn");
-  expect_refused("selftest P/people.fgn#0", 1, "golden frame: the package has nothing to compare with");
-  expect_refused("render P/people.fgn#0 --precision q8 -o x.png", 1, "people.fgn#0: avatar 'ada': its network is there in f32 alone");
-  expect_refused("render P/avatar.fgn --motion P/people.fgn -o x.png", 1, "of kind population, not motion");
+  expect_refused("selftest P/people.fgn#0", 1,
+                 "golden frame: the package has nothing to compare with");
+  expect_refused("render P/people.fgn#0 --precision q8 -o x.png", 1,
+                 "people.fgn#0: avatar 'ada': its network is there in f32 alone");
+  expect_refused("render P/avatar.fgn --motion P/people.fgn -o x.png", 1,
+                 "of kind population, not motion");
 }
 
 TEST_F(Cli, AFileNameMayHaveAHash) {
@@ -134,8 +146,14 @@ TEST_F(Cli, OpaqueBackgroundGivesRgb) {
 }
 
 TEST_F(Cli, ThreadsDoNotChangePixels) {
-  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames 5 --size 64x64 --threads 1 -o a.pfm").exit_code, 0);
-  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames 5 --size 64x64 --threads 3 -o b.pfm").exit_code, 0);
+  ASSERT_EQ(
+      run("render P/avatar.fgn --motion P/motion.fgn --frames 5 --size 64x64 --threads 1 -o a.pfm")
+          .exit_code,
+      0);
+  ASSERT_EQ(
+      run("render P/avatar.fgn --motion P/motion.fgn --frames 5 --size 64x64 --threads 3 -o b.pfm")
+          .exit_code,
+      0);
   EXPECT_EQ(folder_.read("a.pfm"), folder_.read("b.pfm"));
 }
 
@@ -152,26 +170,34 @@ TEST_F(Cli, PngIsTheRoundedPfm) {
 }
 
 TEST_F(Cli, NumbersTheFramesOfASequence) {
-  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames 2:9:3 --size 32x32 -o f_%03d.png").exit_code, 0);
+  ASSERT_EQ(
+      run("render P/avatar.fgn --motion P/motion.fgn --frames 2:9:3 --size 32x32 -o f_%03d.png")
+          .exit_code,
+      0);
   EXPECT_EQ(folder_.names(), (std::vector<std::string>{"f_000.png", "f_001.png", "f_002.png"}));
   EXPECT_NE(folder_.read("f_000.png"), folder_.read("f_002.png"));
 }
 
 TEST_F(Cli, WritesVideo) {
-  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames 0:12:2 --size 33x20 -o x.y4m").exit_code, 0);
-  const std::string video = folder_.read("x.y4m"), header = "YUV4MPEG2 W33 H20 F15:1 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n";
+  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames 0:12:2 --size 33x20 -o x.y4m")
+                .exit_code,
+            0);
+  const std::string video = folder_.read("x.y4m"),
+                    header = "YUV4MPEG2 W33 H20 F15:1 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n";
   EXPECT_TRUE(video.starts_with(header)) << video.substr(0, 80);
   EXPECT_EQ(video.size(), header.size() + 6 * (6 + 33 * 20 + 2 * 17 * 10));
 }
 
 TEST_F(Cli, Mp4NeedsFfmpegAndSaysSo) {
-  expect_refused("render P/avatar.fgn --motion P/motion.fgn --size 32x32 -o x.mp4", 1, "ffmpeg", {.environment = "PATH=/nowhere"});
+  expect_refused("render P/avatar.fgn --motion P/motion.fgn --size 32x32 -o x.mp4", 1, "ffmpeg",
+                 {.environment = "PATH=/nowhere"});
 }
 
 TEST_F(Cli, MakesAContactSheet) {
-  ASSERT_EQ(
-      run("render P/avatar.fgn --motion P/motion.fgn --size 48x32 --contact-sheet s.png --columns 3 --tiles 6 --sheet-shrink 2").exit_code,
-      0);
+  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --size 48x32 --contact-sheet s.png "
+                "--columns 3 --tiles 6 --sheet-shrink 2")
+                .exit_code,
+            0);
   const ImageU8 sheet = png("s.png");
   EXPECT_EQ(sheet.width_px, 3u * 24);
   EXPECT_EQ(sheet.height_px, 2u * 16);
@@ -179,7 +205,8 @@ TEST_F(Cli, MakesAContactSheet) {
 }
 
 TEST_F(Cli, TheCameraThatJsonPrintsCanBeGivenBack) {
-  const ProgramRun orbit = run("render P/avatar.fgn --size 64x48 --camera orbit:30,10,3,40 --near 0.1 --json -o a.pfm");
+  const ProgramRun orbit =
+      run("render P/avatar.fgn --size 64x48 --camera orbit:30,10,3,40 --near 0.1 --json -o a.pfm");
   ASSERT_EQ(orbit.exit_code, 0) << orbit.err;
   folder_.write("c.json", Json::parse(orbit.out)["camera"].dump());
   ASSERT_EQ(run("render P/avatar.fgn --camera c.json -o b.pfm").exit_code, 0);
@@ -191,7 +218,10 @@ TEST_F(Cli, TheCameraThatJsonPrintsCanBeGivenBack) {
 
 TEST_F(Cli, SeveralAvatarsStandSideBySide) {
   ASSERT_EQ(run("render P/avatar.fgn --size 120x60 -o one.png").exit_code, 0);
-  ASSERT_EQ(run("render P/avatar.fgn P/avatar.fgn --spacing 1.5 --camera orbit:0,0,6 --size 120x60 -o two.png").exit_code, 0);
+  ASSERT_EQ(run("render P/avatar.fgn P/avatar.fgn --spacing 1.5 --camera orbit:0,0,6 --size 120x60 "
+                "-o two.png")
+                .exit_code,
+            0);
   const ImageU8 two = png("two.png");
   size_t left = 0, middle = 0, right = 0;
   for (uint32_t y = 0; y < two.height_px; ++y) {
@@ -210,16 +240,22 @@ TEST_F(Cli, FollowingKeepsAWalkerInTheMiddle) {
     const ImageU8 image = png(name);
     double sum = 0, weight = 0;
     for (uint32_t y = 0; y < image.height_px; ++y) {
-      for (uint32_t x = 0; x < image.width_px; ++x) sum += x * image.at(x, y)[3], weight += image.at(x, y)[3];
+      for (uint32_t x = 0; x < image.width_px; ++x)
+        sum += x * image.at(x, y)[3], weight += image.at(x, y)[3];
     }
     EXPECT_GT(weight, 0);
     return sum / weight;
   };
   // The motion walks 1.1 m along x in its 12 frames.
-  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames :  --camera orbit:0,0,5 --size 64x64 -o f%02d.png").exit_code, 0);
+  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames :  --camera orbit:0,0,5 --size "
+                "64x64 -o f%02d.png")
+                .exit_code,
+            0);
   EXPECT_NEAR(mean_x("f00.png"), mean_x("f11.png"), 8);
-  ASSERT_EQ(
-      run("render P/avatar.fgn --motion P/motion.fgn --frames : --follow off --camera orbit:0,0,5 --size 64x64 -o s%02d.png").exit_code, 0);
+  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames : --follow off --camera "
+                "orbit:0,0,5 --size 64x64 -o s%02d.png")
+                .exit_code,
+            0);
   EXPECT_GT(mean_x("s11.png") - mean_x("s00.png"), 12);
 }
 
@@ -227,13 +263,15 @@ TEST_F(Cli, ExportedGaussiansGiveTheSamePicture) {
   folder_.write(
       "c.json",
       R"({"width": 128, "height": 128, "intrinsics": [[170, 0, 64], [0, 170, 64], [0, 0, 1]], "world_to_camera": [[1, 0, 0, 0], [0, -1, 0, 0.5], [0, 0, -1, 3]]})");
-  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames 3 --camera c.json -o a.pfm").exit_code, 0);
+  ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames 3 --camera c.json -o a.pfm")
+                .exit_code,
+            0);
   ASSERT_EQ(run("export P/avatar.fgn --motion P/motion.fgn --frame 3 -o x.ply").exit_code, 0);
   ASSERT_EQ(run("splat x.ply --camera c.json -o b.pfm").exit_code, 0);
   samples::ErrorSum error;
   samples::add_foreground_error(pfm("a.pfm"), pfm("b.pfm"), error);
-  std::printf("export_roundtrip_db %.2f over %llu values, largest difference %.3g\n", error.psnr_db(),
-              static_cast<unsigned long long>(error.values / 3), error.largest);
+  std::printf("export_roundtrip_db %.2f over %llu values, largest difference %.3g\n",
+              error.psnr_db(), static_cast<unsigned long long>(error.values / 3), error.largest);
   EXPECT_GT(error.values, 1000u);
   EXPECT_GE(error.psnr_db(), 80);
 }
@@ -250,9 +288,11 @@ TEST_F(Cli, SplatsAScene) {
 }
 
 TEST_F(Cli, SplatCountsWhatItLeavesOut) {
-  folder_.write("holes.ply", make_ply(standard_columns(0), 20, PlyEncoding::kLittle, [](size_t row, const std::string& name) {
-                  return name == "x" && row < 3 ? NAN : sample_value(row, name);
-                }));
+  folder_.write("holes.ply", make_ply(standard_columns(0), 20, PlyEncoding::kLittle,
+                                      [](size_t row, const std::string& name) {
+                                        return name == "x" && row < 3 ? NAN
+                                                                      : sample_value(row, name);
+                                      }));
   const ProgramRun result = run("splat holes.ply --size 32x32 -o x.png");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_NE(result.err.find("left out 3 Gaussians"), std::string::npos) << result.err;
@@ -260,18 +300,26 @@ TEST_F(Cli, SplatCountsWhatItLeavesOut) {
 
 TEST_F(Cli, EveryUpAxisGivesTheSameSceneTurned) {
   const auto turned = [](char up, int sign) {
-    return make_ply(standard_columns(0), 30, PlyEncoding::kLittle, [=](size_t row, const std::string& name) {
-      const double x = sample_value(row, "x"), y = sample_value(row, "y"), z = sample_value(row, "z");
-      if (name.starts_with("rot_")) return name == "rot_0" ? 1.0 : 0.0;
-      if (name.starts_with("scale_")) return -2.5;
-      if (up == 'y' && sign > 0) return name == "x" ? x : name == "y" ? y : name == "z" ? z : sample_value(row, name);
-      if (up == 'y') return name == "x" ? x : name == "y" ? -y : name == "z" ? -z : sample_value(row, name);
-      return name == "x" ? x : name == "y" ? -sign * z : name == "z" ? sign * y : sample_value(row, name);
-    });
+    return make_ply(
+        standard_columns(0), 30, PlyEncoding::kLittle, [=](size_t row, const std::string& name) {
+          const double x = sample_value(row, "x"), y = sample_value(row, "y"),
+                       z = sample_value(row, "z");
+          if (name.starts_with("rot_")) return name == "rot_0" ? 1.0 : 0.0;
+          if (name.starts_with("scale_")) return -2.5;
+          if (up == 'y' && sign > 0)
+            return name == "x" ? x : name == "y" ? y : name == "z" ? z : sample_value(row, name);
+          if (up == 'y')
+            return name == "x" ? x : name == "y" ? -y : name == "z" ? -z : sample_value(row, name);
+          return name == "x"   ? x
+                 : name == "y" ? -sign * z
+                 : name == "z" ? sign * y
+                               : sample_value(row, name);
+        });
   };
   folder_.write("0.ply", turned('y', 1));
   ASSERT_EQ(run("splat 0.ply --size 48x48 -o 0.pfm").exit_code, 0);
-  const std::pair<std::string, std::string> cases[] = {{"-y", turned('y', -1)}, {"+z", turned('z', 1)}, {"-z", turned('z', -1)}};
+  const std::pair<std::string, std::string> cases[] = {
+      {"-y", turned('y', -1)}, {"+z", turned('z', 1)}, {"-z", turned('z', -1)}};
   for (const auto& [up, text] : cases) {
     folder_.write("1.ply", text);
     ASSERT_EQ(run("splat 1.ply --up=" + up + " --size 48x48 -o 1.pfm").exit_code, 0);
@@ -283,7 +331,8 @@ TEST_F(Cli, EveryUpAxisGivesTheSameSceneTurned) {
 }
 
 TEST_F(Cli, BenchReportsEveryStage) {
-  const ProgramRun result = run("bench P/avatar.fgn --motion P/motion.fgn --frames 10 --threads 2 --json b.json");
+  const ProgramRun result =
+      run("bench P/avatar.fgn --motion P/motion.fgn --frames 10 --threads 2 --json b.json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("network"), std::string::npos);
   const Json json = Json::parse(folder_.read("b.json"));
@@ -311,7 +360,8 @@ TEST_F(Cli, BenchMeasuresEveryPrecisionThatThePackageHolds) {
     if (result.exit_code != 0) return list;
     const Json json = Json::parse(result.out);
     for (const Json& lane : json["runs"]) {
-      list.push_back(lane["precision"].get<std::string>() + " " + std::to_string(lane["threads"].get<int>()));
+      list.push_back(lane["precision"].get<std::string>() + " " +
+                     std::to_string(lane["threads"].get<int>()));
       if (!lane["allocations_per_frame"].is_null()) {
         EXPECT_EQ(lane["allocations_per_frame"], 0.0);
       }
@@ -344,7 +394,9 @@ TEST_F(Cli, EveryCommandTakesAPrecision) {
   const auto precision = [&](const std::string& arguments) {
     const ProgramRun result = run("render " + arguments + " --size 32x32 --json -o x.png");
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    return result.exit_code == 0 ? Json::parse(result.out)["machine"]["precision"].get<std::string>() : "";
+    return result.exit_code == 0
+               ? Json::parse(result.out)["machine"]["precision"].get<std::string>()
+               : "";
   };
   EXPECT_EQ(precision("P/avatar.fgn"), "f32");
   EXPECT_EQ(precision("P/fixed.fgn"), "q8");
@@ -378,14 +430,19 @@ TEST_F(Cli, ReportPlotsTheAlphaCut) {
   EXPECT_EQ(html.find("<script"), std::string::npos);
 }
 
-// The golden picture is this renderer's own here; what is tested is the comparison. Trainer against device: tests/parity.
+// The golden picture is this renderer's own here; what is tested is the comparison. Trainer against
+// device: tests/parity.
 TEST_F(Cli, SelftestTellsTheRightPictureFromWrongOnes) {
   std::filesystem::copy(packages_->path("body.fgn"), folder_.path("body.fgn"));
   const SyntheticAvatar avatar = make_test_avatar(make_test_body());
   const std::array<float, 3> grey = avatar.package->avatar().golden.background;
   folder_.write("camera.json", samples::camera_json(avatar.package->avatar().golden.camera).dump());
-  const std::string background = std::to_string(grey[0]) + "," + std::to_string(grey[1]) + "," + std::to_string(grey[2]);
-  ASSERT_EQ(run("render P/avatar.fgn --camera camera.json --background " + background + " -o golden.png").exit_code, 0);
+  const std::string background =
+      std::to_string(grey[0]) + "," + std::to_string(grey[1]) + "," + std::to_string(grey[2]);
+  ASSERT_EQ(
+      run("render P/avatar.fgn --camera camera.json --background " + background + " -o golden.png")
+          .exit_code,
+      0);
   write_golden_avatar(folder_, "right.fgn", folder_.read("golden.png"));
   const ProgramRun right = run("selftest right.fgn --json");
   EXPECT_EQ(right.exit_code, 0) << right.err;
@@ -396,14 +453,16 @@ TEST_F(Cli, SelftestTellsTheRightPictureFromWrongOnes) {
   ImageU8 picture = png("golden.png");
   const auto expect_failed = [&](const ImageU8& wrong, const char* what) {
     const std::vector<std::byte> bytes = *ports::encode_png(wrong);
-    write_golden_avatar(folder_, "wrong.fgn", std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+    write_golden_avatar(folder_, "wrong.fgn",
+                        std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
     const ProgramRun result = run("selftest wrong.fgn --json");
     EXPECT_EQ(result.exit_code, 1) << what;
     EXPECT_EQ(result.error_lines(), 1u) << what;
     EXPECT_FALSE(Json::parse(result.out)["passed"].get<bool>()) << what;
   };
   ImageU8 brighter = picture;
-  for (uint8_t& value : brighter.pixels) value = static_cast<uint8_t>(std::min(255, value + 2));  // 42 dB
+  for (uint8_t& value : brighter.pixels)
+    value = static_cast<uint8_t>(std::min(255, value + 2));  // 42 dB
   expect_failed(brighter, "brighter by two levels");
   ImageU8 moved = picture;
   std::copy(picture.pixels.begin(), picture.pixels.end() - 3, moved.pixels.begin() + 3);
@@ -427,7 +486,8 @@ TEST_F(Cli, SelftestHoldsTheFrameInFixedPointToItsHash) {
     EXPECT_NE(wrong.err.find(words), std::string::npos) << wrong.err;
   }
 
-  const std::array<uint64_t, 2> hash = {std::stoull(here.substr(16), nullptr, 16), std::stoull(here.substr(0, 16), nullptr, 16)};
+  const std::array<uint64_t, 2> hash = {std::stoull(here.substr(16), nullptr, 16),
+                                        std::stoull(here.substr(0, 16), nullptr, 16)};
   write_golden_avatar(folder_, "right.fgn", "", Held::kFixedPoint, hash);
   for (const char* threads : {"1", "2"}) {
     const ProgramRun right = run(std::string("selftest right.fgn --json --threads ") + threads);
@@ -437,7 +497,9 @@ TEST_F(Cli, SelftestHoldsTheFrameInFixedPointToItsHash) {
   }
 
   // Both precisions: each has to agree.
-  ASSERT_EQ(run("render P/both.fgn --precision f32 --size 64x64 --background 0,0,0 -o black.png").exit_code, 0);
+  ASSERT_EQ(run("render P/both.fgn --precision f32 --size 64x64 --background 0,0,0 -o black.png")
+                .exit_code,
+            0);
   write_golden_avatar(folder_, "half.fgn", folder_.read("black.png"), Held::kBoth, hash);
   const ProgramRun half = run("selftest half.fgn --json");
   EXPECT_EQ(half.exit_code, 1);
@@ -448,12 +510,14 @@ TEST_F(Cli, SelftestHoldsTheFrameInFixedPointToItsHash) {
 }
 
 TEST_F(Cli, RenderJsonHasWhatTheDemoNeeds) {
-  const ProgramRun result = run("render P/avatar.fgn --motion P/motion.fgn --frames 0:4 --size 32x32 --json -o x.y4m");
+  const ProgramRun result =
+      run("render P/avatar.fgn --motion P/motion.fgn --frames 0:4 --size 32x32 --json -o x.y4m");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json json = Json::parse(result.out);
   EXPECT_EQ(json["frames"], 4);
   EXPECT_GT(json["frames_per_second"], 0.0);
-  for (const char* stage : {"total", "maps", "network", "blend"}) EXPECT_TRUE(json["stages_ms"].contains(stage)) << stage;
+  for (const char* stage : {"total", "maps", "network", "blend"})
+    EXPECT_TRUE(json["stages_ms"].contains(stage)) << stage;
 }
 
 TEST_F(Cli, BodiesAreFoundByContentHash) {
@@ -464,14 +528,16 @@ TEST_F(Cli, BodiesAreFoundByContentHash) {
   ProgramRun result = run(render);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_NE(result.err.find("body: needs "), std::string::npos) << result.err;
-  EXPECT_EQ(run(render, {.environment = "FIGURINE_PATH=/nowhere:" + packages_->path()}).exit_code, 0);
+  EXPECT_EQ(run(render, {.environment = "FIGURINE_PATH=/nowhere:" + packages_->path()}).exit_code,
+            0);
   EXPECT_EQ(run(render + " --body P/body.fgn").exit_code, 0);
   std::filesystem::copy(packages_->path("body.fgn"), apart.path("anything.fgn"));
   EXPECT_EQ(run(render).exit_code, 0);
 }
 
 TEST_F(Cli, AWrongBodyIsNamedWithBothHashes) {
-  const ProgramRun result = run("render P/avatar.fgn --body P/other_body.fgn --size 16x16 -o x.png");
+  const ProgramRun result =
+      run("render P/avatar.fgn --body P/other_body.fgn --size 16x16 -o x.png");
   EXPECT_EQ(result.exit_code, 1);
   size_t hashes = 0, digits = 0;
   for (const char c : result.err + " ") {
@@ -486,12 +552,16 @@ TEST_F(Cli, BadInputGetsOneLineAndNoFile) {
   expect_refused("render P/missing.fgn -o x.png", 1, "missing.fgn");
   expect_refused("render P/noise.fgn -o x.png", 1, "noise.fgn");
   expect_refused("render P -o x.png", 1, "P");
-  expect_refused("render P/motion.fgn -o x.png", 1, "motion.fgn: kind: is a package of kind motion, not avatar");
+  expect_refused("render P/motion.fgn -o x.png", 1,
+                 "motion.fgn: kind: is a package of kind motion, not avatar");
   expect_refused("render P/avatar.fgn --motion P/body.fgn -o x.png", 1, "not motion");
   expect_refused("render P/avatar.fgn --body P/avatar.fgn -o x.png", 1, "not body");
-  expect_refused("render P/avatar.fgn --motion P/motion.fgn --frames 5:13 -o x_%d.png", 1, "the motion has 12 frames");
-  expect_refused("render P/avatar.fgn --frames 1 -o x.png", 1, "without --motion there is one frame");
-  expect_refused("render P/avatar.fgn --motion P/motion.fgn --frames 0:5 -o x.png", 1, "x_%04d.png");
+  expect_refused("render P/avatar.fgn --motion P/motion.fgn --frames 5:13 -o x_%d.png", 1,
+                 "the motion has 12 frames");
+  expect_refused("render P/avatar.fgn --frames 1 -o x.png", 1,
+                 "without --motion there is one frame");
+  expect_refused("render P/avatar.fgn --motion P/motion.fgn --frames 0:5 -o x.png", 1,
+                 "x_%04d.png");
   expect_refused("render P/avatar.fgn --camera none.json -o x.png", 1, "none.json");
   expect_refused("render P/avatar.fgn --camera orbit:0,95,3 -o x.png", 1, "elevation");
   expect_refused("render P/avatar.fgn -o x.jpg", 1, "x.jpg");
@@ -500,7 +570,8 @@ TEST_F(Cli, BadInputGetsOneLineAndNoFile) {
   expect_refused("render P/avatar.fgn --background alpha -o x.y4m", 1, "alpha");
   expect_refused("render P/avatar.fgn", 1, "nothing to write");
   expect_refused("render P/avatar.fgn --size 100000x2 -o x.png", 1, "size");
-  expect_refused("render P/avatar.fgn --precision q8 -o x.png", 1, "figurine-train pack --precision q8");
+  expect_refused("render P/avatar.fgn --precision q8 -o x.png", 1,
+                 "figurine-train pack --precision q8");
   expect_refused("render P/fixed.fgn --precision f32 -o x.png", 1, "in q8 alone, not in f32");
   expect_refused("bench P/fixed.fgn --precision f32", 1, "in q8 alone, not in f32");
   expect_refused("selftest P/fixed.fgn --precision f32", 1, "nothing to compare with");
@@ -530,7 +601,8 @@ TEST_F(Cli, AMalformedCommandLineIsUsage) {
 }
 
 TEST_F(Cli, HelpAndVersionAreNoErrors) {
-  for (const char* arguments : {"--help", "--version", "render --help", "splat --help", "report --help"}) {
+  for (const char* arguments :
+       {"--help", "--version", "render --help", "splat --help", "report --help"}) {
     const ProgramRun result = run(arguments);
     EXPECT_EQ(result.exit_code, 0) << arguments;
     EXPECT_NE(result.out, "") << arguments;
@@ -538,20 +610,26 @@ TEST_F(Cli, HelpAndVersionAreNoErrors) {
   }
 }
 
-// The system refuses to write past a limit, as a full disk does. XFSZ is the signal of the limit; a disk sends none.
+// The system refuses to write past a limit, as a full disk does. XFSZ is the signal of the limit; a
+// disk sends none.
 TEST_F(Cli, AFullDiskLeavesNothing) {
-  const RunOptions full{.before = "trap '' XFSZ; ulimit -f 4;"};  // 4 KiB: less than any of these files
+  const RunOptions full{.before =
+                            "trap '' XFSZ; ulimit -f 4;"};  // 4 KiB: less than any of these files
   expect_refused("render P/avatar.fgn --size 256x256 -o x.pfm", 1, "x.pfm", full);
-  expect_refused("render P/avatar.fgn --motion P/motion.fgn --size 256x256 -o x.y4m", 1, "x.y4m", full);
-  expect_refused("render P/avatar.fgn --motion P/motion.fgn --size 256x256 -o x_%d.pfm", 1, "x_0.pfm", full);
+  expect_refused("render P/avatar.fgn --motion P/motion.fgn --size 256x256 -o x.y4m", 1, "x.y4m",
+                 full);
+  expect_refused("render P/avatar.fgn --motion P/motion.fgn --size 256x256 -o x_%d.pfm", 1,
+                 "x_0.pfm", full);
   expect_refused("export P/avatar.fgn -o x.ply", 1, "x.ply", full);
 }
 
 TEST_F(Cli, AnInterruptLeavesNothing) {
   for (const char* output : {"x.y4m", "x_%04d.png"}) {
     // Long enough to be interrupted: the same twelve frames at a size that takes seconds.
-    const ProgramRun result = run("render P/avatar.fgn --motion P/motion.fgn --size 3000x3000 --threads 1 -o " + std::string(output),
-                                  {.before = "timeout -s INT 0.7"});
+    const ProgramRun result =
+        run("render P/avatar.fgn --motion P/motion.fgn --size 3000x3000 --threads 1 -o " +
+                std::string(output),
+            {.before = "timeout -s INT 0.7"});
     EXPECT_NE(result.exit_code, 0);
     EXPECT_NE(result.exit_code, 1);
     EXPECT_TRUE(folder_.names().empty()) << folder_.names().front();

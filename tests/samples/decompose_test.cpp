@@ -1,4 +1,5 @@
-// Scales and rotation from a covariance factor: closed form first, then random factors over all shapes.
+// Scales and rotation from a covariance factor: closed form first, then random factors over all
+// shapes.
 #include "samples/gaussians/decompose.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +22,8 @@ Matrix rotation_of(const std::array<double, 4>& q) {
           2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 
-void expect_same_covariance(const std::array<float, 9>& factor, const ScaleRotation& shape, LargestError& error) {
+void expect_same_covariance(const std::array<float, 9>& factor, const ScaleRotation& shape,
+                            LargestError& error) {
   const Matrix r = rotation_of(shape.quaternion);
   double largest = 0, covariance[9], again[9];
   for (int i = 0; i < 3; ++i) {
@@ -51,7 +53,8 @@ TEST(Decompose, RandomFactorsOfEveryShape) {
   LargestError error("covariance from scales and rotation, relative"), length("quaternion length");
   for (int i = 0; i < 20000; ++i) {
     std::array<float, 9> factor;
-    for (int k = 0; k < 9; ++k) factor[k] = normal(random) * std::pow(10.0f, static_cast<float>(k % 3 == 0 ? 0 : -(i % 7)));
+    for (int k = 0; k < 9; ++k)
+      factor[k] = normal(random) * std::pow(10.0f, static_cast<float>(k % 3 == 0 ? 0 : -(i % 7)));
     if (i % 2 == 1) {  // mirrored: the rotation must still be proper
       for (int r = 0; r < 3; ++r) std::swap(factor[3 * r], factor[3 * r + 1]);
     }
@@ -60,7 +63,8 @@ TEST(Decompose, RandomFactorsOfEveryShape) {
     double length2 = 0;
     for (const double value : shape.quaternion) length2 += value * value;
     length.add(length2, 1);
-    ASSERT_TRUE(shape.scale[0] >= shape.scale[1] && shape.scale[1] >= shape.scale[2] && shape.scale[2] >= 0);
+    ASSERT_TRUE(shape.scale[0] >= shape.scale[1] && shape.scale[1] >= shape.scale[2] &&
+                shape.scale[2] >= 0);
     ASSERT_GE(shape.quaternion[0], 0);
   }
   EXPECT_LE(error.largest(), 1e-13);
@@ -71,7 +75,8 @@ TEST(Decompose, RandomFactorsOfEveryShape) {
 TEST(Decompose, SmallAxesKeepTheirRelativeAccuracy) {
   const double angle = 0.7;
   const auto c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
-  const float small = 0x1p-30f;  // a power of two: the products below are exact, the columns orthogonal
+  const float small =
+      0x1p-30f;  // a power of two: the products below are exact, the columns orthogonal
   const std::array<float, 9> factor{c, -s * small, 0, s, c * small, 0, 0, 0, 1e-5f};
   const ScaleRotation shape = decompose(factor.data());
   const double length = std::hypot(double(c), double(s));
@@ -82,9 +87,10 @@ TEST(Decompose, SmallAxesKeepTheirRelativeAccuracy) {
 
 TEST(Decompose, FlatAndPointlikeGaussians) {
   LargestError error("covariance of singular factors, relative");
-  const std::array<float, 9> disc{1, 0, 0, 0, 1, 0, 0, 0, 0}, needle{0, 0, 0, 0, 0, 0, 0.5f, 0.5f, 0},
-      tiny{1e-30f, 0, 0, 0, 1e-32f, 0, 0, 0, 1e-30f};
-  for (const auto& factor : {disc, needle, tiny}) expect_same_covariance(factor, decompose(factor.data()), error);
+  const std::array<float, 9> disc{1, 0, 0, 0, 1, 0, 0, 0, 0},
+      needle{0, 0, 0, 0, 0, 0, 0.5f, 0.5f, 0}, tiny{1e-30f, 0, 0, 0, 1e-32f, 0, 0, 0, 1e-30f};
+  for (const auto& factor : {disc, needle, tiny})
+    expect_same_covariance(factor, decompose(factor.data()), error);
   EXPECT_LE(error.largest(), 1e-14);
   const std::array<float, 9> nothing{};
   const ScaleRotation point = decompose(nothing.data());

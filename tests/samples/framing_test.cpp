@@ -1,4 +1,5 @@
-// The default camera: what it must hold is inside the picture, and it does not stand further away than that needs.
+// The default camera: what it must hold is inside the picture, and it does not stand further away
+// than that needs.
 #include "samples/figurine/framing.h"
 
 #include <gtest/gtest.h>
@@ -13,20 +14,23 @@ namespace {
 std::vector<Point> box_corners(Point low, Point high) {
   std::vector<Point> points;
   for (int corner = 0; corner < 8; ++corner) {
-    points.push_back({corner & 1 ? high[0] : low[0], corner & 2 ? high[1] : low[1], corner & 4 ? high[2] : low[2]});
+    points.push_back({corner & 1 ? high[0] : low[0], corner & 2 ? high[1] : low[1],
+                      corner & 4 ? high[2] : low[2]});
   }
   return points;
 }
 
 // The largest |offset from the middle| / half size over all points, as the real camera sees them.
-double reach(const std::vector<Point>& points, const OrbitCamera& orbit, uint32_t width, uint32_t height) {
+double reach(const std::vector<Point>& points, const OrbitCamera& orbit, uint32_t width,
+             uint32_t height) {
   const Result<Camera> camera = make_orbit_camera(orbit, width, height);
   EXPECT_TRUE(camera.ok());
   double largest = 0;
   for (const Point& p : points) {
     double view[3];
     const auto& m = camera->view_from_world;
-    for (int r = 0; r < 3; ++r) view[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
+    for (int r = 0; r < 3; ++r)
+      view[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
     EXPECT_GT(view[2], 0);
     largest = std::max({largest, std::abs(camera->fx_px * view[0] / view[2]) / (0.5 * width),
                         std::abs(camera->fy_px * view[1] / view[2]) / (0.5 * height)});
@@ -39,9 +43,12 @@ TEST(FitDistance, TouchesTheMarginFromAnyDirectionAndShape) {
   for (const float azimuth : {0.0f, 40.0f, 200.0f}) {
     for (const float elevation : {-30.0f, 0.0f, 60.0f}) {
       for (const auto& [width, height] : {std::pair{512u, 512u}, {300u, 700u}, {900u, 200u}}) {
-        OrbitCamera orbit{.azimuth_deg = azimuth, .elevation_deg = elevation, .target_m = {0, 0.9f, 0}};
-        orbit.distance_m = fit_distance_m(points, orbit, double(width) / height, {.share = 1, .margin = 0.1});
-        EXPECT_NEAR(reach(points, orbit, width, height), 0.9, 1e-4) << azimuth << " " << elevation << " " << width;
+        OrbitCamera orbit{
+            .azimuth_deg = azimuth, .elevation_deg = elevation, .target_m = {0, 0.9f, 0}};
+        orbit.distance_m =
+            fit_distance_m(points, orbit, double(width) / height, {.share = 1, .margin = 0.1});
+        EXPECT_NEAR(reach(points, orbit, width, height), 0.9, 1e-4)
+            << azimuth << " " << elevation << " " << width;
       }
     }
   }
@@ -49,7 +56,9 @@ TEST(FitDistance, TouchesTheMarginFromAnyDirectionAndShape) {
 
 TEST(FitDistance, IgnoresStraysAndNotFinitePoints) {
   std::vector<Point> points;
-  for (int i = 0; i < 1000; ++i) points.push_back({0.001f * static_cast<float>(i % 100), 0.001f * static_cast<float>(i / 10), 0});
+  for (int i = 0; i < 1000; ++i)
+    points.push_back(
+        {0.001f * static_cast<float>(i % 100), 0.001f * static_cast<float>(i / 10), 0});
   OrbitCamera orbit;
   const float near_distance = fit_distance_m(points, orbit, 1);
   points.push_back({1e6f, 0, 0});
@@ -58,11 +67,14 @@ TEST(FitDistance, IgnoresStraysAndNotFinitePoints) {
   EXPECT_NEAR(fit_distance_m(points, orbit, 1), near_distance, 0.01 * near_distance);
 }
 
-TEST(FitDistance, WithoutPointsStaysAsItIs) { EXPECT_EQ(fit_distance_m({}, {.distance_m = 7}, 1), 7.0f); }
+TEST(FitDistance, WithoutPointsStaysAsItIs) {
+  EXPECT_EQ(fit_distance_m({}, {.distance_m = 7}, 1), 7.0f);
+}
 
 TEST(RobustCentre, IsTheMiddleOfTheMassNotOfTheExtremes) {
   std::vector<Point> points;
-  for (int i = 0; i <= 100; ++i) points.push_back({static_cast<float>(i), 2 * static_cast<float>(i), -1});
+  for (int i = 0; i <= 100; ++i)
+    points.push_back({static_cast<float>(i), 2 * static_cast<float>(i), -1});
   points.push_back({1e9f, -1e9f, 0});
   const Point centre = robust_centre(points, 0.9);
   EXPECT_NEAR(centre[0], 50, 1.5);

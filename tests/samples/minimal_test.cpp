@@ -10,7 +10,8 @@ namespace {
 TEST(Minimal, WritesTheGoldenViewAsRawRgba) {
   const TestFolder folder;
   write_test_packages(folder);
-  const ProgramRun run = run_shell("'" FIGURINE_MINIMAL "' avatar.fgn body.fgn 40 40 > raw", folder);
+  const ProgramRun run =
+      run_shell("'" FIGURINE_MINIMAL "' avatar.fgn body.fgn 40 40 > raw", folder);
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string raw = folder.read("raw");
   ASSERT_EQ(raw.size(), 40u * 40 * 4);
@@ -22,8 +23,10 @@ TEST(Minimal, WritesTheGoldenViewAsRawRgba) {
 TEST(Minimal, BadInputIsOneLine) {
   const TestFolder folder;
   write_test_packages(folder);
-  for (const char* arguments : {"none.fgn body.fgn 4 4", "avatar.fgn none.fgn 4 4", "body.fgn body.fgn 4 4", "avatar.fgn avatar.fgn 4 4",
-                                "avatar.fgn other_body.fgn 4 4", "avatar.fgn body.fgn 0 4", "avatar.fgn body.fgn 4 x"}) {
+  for (const char* arguments :
+       {"none.fgn body.fgn 4 4", "avatar.fgn none.fgn 4 4", "body.fgn body.fgn 4 4",
+        "avatar.fgn avatar.fgn 4 4", "avatar.fgn other_body.fgn 4 4", "avatar.fgn body.fgn 0 4",
+        "avatar.fgn body.fgn 4 x"}) {
     const ProgramRun run = run_shell(std::string("'" FIGURINE_MINIMAL "' ") + arguments, folder);
     EXPECT_EQ(run.exit_code, 1) << arguments;
     EXPECT_EQ(run.error_lines(), 1u) << run.err;

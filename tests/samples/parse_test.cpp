@@ -14,14 +14,15 @@ TEST(ParseSize, TakesWidthAndHeight) {
 }
 
 TEST(ParseSize, RefusesEverythingElse) {
-  for (const char* text :
-       {"", "512", "512x", "x512", "512X512", "0x4", "4x0", "16385x1", "-1x4", "4x4x4", "4 x4", "1e3x4", "99999999999x1"}) {
+  for (const char* text : {"", "512", "512x", "x512", "512X512", "0x4", "4x0", "16385x1", "-1x4",
+                           "4x4x4", "4 x4", "1e3x4", "99999999999x1"}) {
     EXPECT_FALSE(parse_size(text).ok()) << text;
   }
 }
 
 TEST(ParseFrames, TakesOneFrameRangesAndSteps) {
-  const auto expect = [](const char* text, uint32_t first, std::optional<uint32_t> end, uint32_t step) {
+  const auto expect = [](const char* text, uint32_t first, std::optional<uint32_t> end,
+                         uint32_t step) {
     const Result<FrameRange> range = parse_frames(text);
     ASSERT_TRUE(range.ok()) << text;
     EXPECT_EQ(range->first, first) << text;
@@ -38,7 +39,8 @@ TEST(ParseFrames, TakesOneFrameRangesAndSteps) {
 }
 
 TEST(ParseFrames, RefusesEverythingElse) {
-  for (const char* text : {"", "a", "1:a", "5:5", "6:5", "1:9:0", "1:9:", "1:2:3:4", "-1:4", "1.5", "4294967295", "99999999999"}) {
+  for (const char* text : {"", "a", "1:a", "5:5", "6:5", "1:9:0", "1:9:", "1:2:3:4", "-1:4", "1.5",
+                           "4294967295", "99999999999"}) {
     EXPECT_FALSE(parse_frames(text).ok()) << text;
   }
 }
@@ -49,7 +51,8 @@ TEST(ParseBackground, TakesNamesCodesAndNumbers) {
   EXPECT_EQ((*parse_background("#ff8000")->colour)[1], 128.0f / 255);
   EXPECT_EQ((*parse_background("#FF8000")->colour)[2], 0.0f);
   EXPECT_EQ((*parse_background("0.25,0.5,1")->colour)[0], 0.25f);
-  for (const char* text : {"", "#12345", "#1234567", "#gg0000", "1,2", "1,1,1,1", "1.5,0,0", "-0.1,0,0", "nan,0,0", "inf,0,0", "blue"}) {
+  for (const char* text : {"", "#12345", "#1234567", "#gg0000", "1,2", "1,1,1,1", "1.5,0,0",
+                           "-0.1,0,0", "nan,0,0", "inf,0,0", "blue"}) {
     EXPECT_FALSE(parse_background(text).ok()) << text;
   }
 }
@@ -61,7 +64,8 @@ TEST(ParsePlacement, TakesPlaceAndHeading) {
   EXPECT_EQ(place->z_m, -2.0f);
   EXPECT_EQ(place->heading_deg, 90.0f);
   EXPECT_EQ(parse_placement("0,1")->heading_deg, 0.0f);
-  for (const char* text : {"", "1", "1,", "a,b", "1,2,3,4", "1e9,0", "nan,0"}) EXPECT_FALSE(parse_placement(text).ok()) << text;
+  for (const char* text : {"", "1", "1,", "a,b", "1,2,3,4", "1e9,0", "nan,0"})
+    EXPECT_FALSE(parse_placement(text).ok()) << text;
 }
 
 TEST(NumberedName, PutsTheNumberWhereItBelongs) {
@@ -73,7 +77,8 @@ TEST(NumberedName, PutsTheNumberWhereItBelongs) {
 }
 
 TEST(NumberedName, IsNoPrintfFormat) {
-  for (const char* text : {"x%s.png", "x%.png", "x%n", "%04d%04d.png", "x%%.png", "x%4d.png", "x%0", "x%00d.png", "x%099d.png", "x%d%s"}) {
+  for (const char* text : {"x%s.png", "x%.png", "x%n", "%04d%04d.png", "x%%.png", "x%4d.png", "x%0",
+                           "x%00d.png", "x%099d.png", "x%d%s"}) {
     EXPECT_FALSE(NumberedName::parse(text).ok()) << text;
   }
 }

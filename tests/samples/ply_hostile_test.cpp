@@ -1,4 +1,5 @@
-// Broken and hostile .ply files: one line that names the file and the reason, no crash, no memory beyond the file's own size.
+// Broken and hostile .ply files: one line that names the file and the reason, no crash, no memory
+// beyond the file's own size.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,9 +17,12 @@ using tests::sample_ply;
 using tests::sample_value;
 using tests::standard_columns;
 
-Result<GaussianCloud> read(const std::string& text) { return read_gaussian_ply(std::as_bytes(std::span(text)), "x.ply"); }
+Result<GaussianCloud> read(const std::string& text) {
+  return read_gaussian_ply(std::as_bytes(std::span(text)), "x.ply");
+}
 
-void expect_refused(const std::string& text, const std::string& reason, StatusCode code = StatusCode::kCorrupt) {
+void expect_refused(const std::string& text, const std::string& reason,
+                    StatusCode code = StatusCode::kCorrupt) {
   const Result<GaussianCloud> cloud = read(text);
   ASSERT_FALSE(cloud.ok()) << reason;
   EXPECT_EQ(cloud.status().code(), code) << cloud.status().message();
@@ -38,16 +42,19 @@ TEST(HostilePly, EveryMissingPropertyIsNamed) {
     std::vector<PlyColumn> columns = standard_columns(1, false);
     std::erase_if(columns, [&](const PlyColumn& c) { return c.name == column.name; });
     const std::string text = tests::make_ply(columns, 2, PlyEncoding::kLittle, sample_value);
-    expect_refused(text, column.name.starts_with("f_rest_") ? "8 f_rest properties" : "no property " + column.name);
+    expect_refused(text, column.name.starts_with("f_rest_") ? "8 f_rest properties"
+                                                            : "no property " + column.name);
   }
 }
 
 TEST(HostilePly, EveryPrefixIsRefused) {
-  for (const PlyEncoding encoding : {PlyEncoding::kAscii, PlyEncoding::kLittle, PlyEncoding::kBig}) {
+  for (const PlyEncoding encoding :
+       {PlyEncoding::kAscii, PlyEncoding::kLittle, PlyEncoding::kBig}) {
     const std::string text = sample_ply(1, 3, encoding);
     // The last line's end, and digits of the last number, may go without loss in ascii.
     const size_t end = encoding == PlyEncoding::kAscii ? text.find_last_of(' ') + 1 : text.size();
-    for (size_t length = 0; length < end; ++length) EXPECT_FALSE(read(text.substr(0, length)).ok()) << length;
+    for (size_t length = 0; length < end; ++length)
+      EXPECT_FALSE(read(text.substr(0, length)).ok()) << length;
     EXPECT_TRUE(read(text).ok());
   }
 }
@@ -56,8 +63,10 @@ TEST(HostilePly, HugeCountsTakeNoMemory) {
   for (const PlyEncoding encoding : {PlyEncoding::kAscii, PlyEncoding::kLittle}) {
     const std::string text = sample_ply(0, 3, encoding);
     EXPECT_FALSE(read(replaced(text, "vertex 3", "vertex 4")).ok());
-    for (const char* count : {"4294967295", "4294967296", "18446744073709551615", "1000000000000"}) {
-      expect_refused(replaced(text, "vertex 3", std::string("vertex ") + count), "the data holds at most");
+    for (const char* count :
+         {"4294967295", "4294967296", "18446744073709551615", "1000000000000"}) {
+      expect_refused(replaced(text, "vertex 3", std::string("vertex ") + count),
+                     "the data holds at most");
     }
     expect_refused(replaced(text, "vertex 3", "vertex 18446744073709551616"), "count");
     expect_refused(replaced(text, "vertex 3", "vertex -1"), "count");
@@ -67,12 +76,20 @@ TEST(HostilePly, HugeCountsTakeNoMemory) {
 
 TEST(HostilePly, HugeElementsBeforeTheVertices) {
   const std::string text = sample_ply(0, 3);
-  expect_refused(replaced(text, "element vertex", "element a 18446744073709551615\nproperty uchar b\nelement vertex"), "ends early");
-  expect_refused(replaced(text, "element vertex", "element a 18446744073709551615\nproperty list uchar uchar b\nelement vertex"),
+  expect_refused(replaced(text, "element vertex",
+                          "element a 18446744073709551615\nproperty uchar b\nelement vertex"),
                  "ends early");
-  expect_refused(replaced(text, "element vertex", "element a 1\nproperty list double double b\nelement vertex"), "");
+  expect_refused(
+      replaced(text, "element vertex",
+               "element a 18446744073709551615\nproperty list uchar uchar b\nelement vertex"),
+      "ends early");
+  expect_refused(replaced(text, "element vertex",
+                          "element a 1\nproperty list double double b\nelement vertex"),
+                 "");
   // An element without properties has no bytes, however many rows it claims.
-  EXPECT_TRUE(read(replaced(text, "element vertex", "element a 18446744073709551615\nelement vertex")).ok());
+  EXPECT_TRUE(
+      read(replaced(text, "element vertex", "element a 18446744073709551615\nelement vertex"))
+          .ok());
 }
 
 TEST(HostilePly, BrokenHeaders) {
@@ -85,32 +102,38 @@ TEST(HostilePly, BrokenHeaders) {
   expect_refused("ply\nformat ascii 1.0\nend_header\n", "no element vertex");
   expect_refused(replaced(text, "binary_little_endian", "binary_middle_endian"), "unknown format");
   expect_refused(replaced(text, "property float x", "property half x"), "property type");
-  expect_refused(replaced(text, "property float x", "property list uchar float x"), "list property");
+  expect_refused(replaced(text, "property float x", "property list uchar float x"),
+                 "list property");
   expect_refused(replaced(text, "property float x", "property list half float x"), "property type");
   expect_refused(replaced(text, "property float x", "property float x y"), "property type");
   expect_refused(replaced(text, "property float x", "nonsense"), "no header line: 'nonsense'");
   expect_refused(replaced(text, "element vertex 2\n", ""), "property before any element");
-  expect_refused(replaced(text, "comment made by a test", std::string("\x1b[31m\x07") + std::string(100, 'x')),
-                 "no header line: '?[31m?xxx");
+  expect_refused(
+      replaced(text, "comment made by a test", std::string("\x1b[31m\x07") + std::string(100, 'x')),
+      "no header line: '?[31m?xxx");
   std::string many = "ply\nformat ascii 1.0\nelement vertex 1\n";
   for (int i = 0; i < 5000; ++i) many += "property float p\n";
   expect_refused(many + "end_header\n", "more than 4096 properties");
-  expect_refused("ply\n" + std::string(2 << 20, '\n') + "format ascii 1.0\nend_header\n", "no end_header");
+  expect_refused("ply\n" + std::string(2 << 20, '\n') + "format ascii 1.0\nend_header\n",
+                 "no end_header");
 }
 
 TEST(HostilePly, WordsThatAreNoNumbers) {
   const std::string text = sample_ply(0, 2, PlyEncoding::kAscii);
   const size_t body = text.find("end_header\n") + 11;
   for (const char* word : {"x ", "1.0e ", "0x10 ", "1,5 ", "-- ", "+-1 ", "++1 "}) {
-    expect_refused(text.substr(0, body) + word + text.substr(text.find(' ', body) + 1), "vertex 0 has no number for x");
+    expect_refused(text.substr(0, body) + word + text.substr(text.find(' ', body) + 1),
+                   "vertex 0 has no number for x");
   }
 }
 
 TEST(HostilePly, WhatIsSoundButNotReadSaysSo) {
   const std::string text = sample_ply(0, 2);
-  expect_refused(replaced(text, "property float x", "property uint packed_position\nproperty float x"), "compressed",
-                 StatusCode::kUnsupported);
-  expect_refused(tests::make_ply(standard_columns(4), 1, PlyEncoding::kLittle, sample_value), "72 f_rest", StatusCode::kUnsupported);
+  expect_refused(
+      replaced(text, "property float x", "property uint packed_position\nproperty float x"),
+      "compressed", StatusCode::kUnsupported);
+  expect_refused(tests::make_ply(standard_columns(4), 1, PlyEncoding::kLittle, sample_value),
+                 "72 f_rest", StatusCode::kUnsupported);
 }
 
 // Flipped bytes may give other numbers, never a crash or a cloud that contradicts itself.
@@ -121,7 +144,8 @@ TEST(HostilePly, FlippedBytesStaySound) {
     size_t accepted = 0;
     for (int round = 0; round < 20000; ++round) {
       std::string broken = text;
-      for (unsigned flips = 1 + random() % 3; flips > 0; --flips) broken[random() % broken.size()] ^= static_cast<char>(1u << random() % 8);
+      for (unsigned flips = 1 + random() % 3; flips > 0; --flips)
+        broken[random() % broken.size()] ^= static_cast<char>(1u << random() % 8);
       const Result<GaussianCloud> cloud = read(broken);
       if (!cloud.ok()) continue;
       ++accepted;

@@ -22,7 +22,8 @@ inline std::vector<PlyColumn> standard_columns(int sh_degree, bool normals = tru
   std::vector<PlyColumn> columns = {{"x"}, {"y"}, {"z"}};
   if (normals) columns.insert(columns.end(), {{"nx"}, {"ny"}, {"nz"}});
   for (int k = 0; k < 3; ++k) columns.push_back({"f_dc_" + std::to_string(k)});
-  for (int k = 0; k < 3 * ((sh_degree + 1) * (sh_degree + 1) - 1); ++k) columns.push_back({"f_rest_" + std::to_string(k)});
+  for (int k = 0; k < 3 * ((sh_degree + 1) * (sh_degree + 1) - 1); ++k)
+    columns.push_back({"f_rest_" + std::to_string(k)});
   columns.push_back({"opacity"});
   for (int k = 0; k < 3; ++k) columns.push_back({"scale_" + std::to_string(k)});
   for (int k = 0; k < 4; ++k) columns.push_back({"rot_" + std::to_string(k)});
@@ -30,14 +31,17 @@ inline std::vector<PlyColumn> standard_columns(int sh_degree, bool normals = tru
 }
 
 // value(row, name) is asked for every property.
-inline std::string make_ply(const std::vector<PlyColumn>& columns, size_t rows, PlyEncoding encoding,
-                            const std::function<double(size_t, const std::string&)>& value, const std::string& before_vertex = "",
+inline std::string make_ply(const std::vector<PlyColumn>& columns, size_t rows,
+                            PlyEncoding encoding,
+                            const std::function<double(size_t, const std::string&)>& value,
+                            const std::string& before_vertex = "",
                             const std::string& data_before = "") {
   const char* names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
   std::ostringstream out;
   out << "ply\nformat " << names[static_cast<int>(encoding)] << " 1.0\ncomment made by a test\n"
       << before_vertex << "element vertex " << rows << "\n";
-  for (const PlyColumn& column : columns) out << "property " << column.type << " " << column.name << "\n";
+  for (const PlyColumn& column : columns)
+    out << "property " << column.type << " " << column.name << "\n";
   out << "end_header\n" << data_before;
   out.precision(17);
   const auto put = [&](auto number) {
@@ -65,8 +69,8 @@ inline std::string make_ply(const std::vector<PlyColumn>& columns, size_t rows, 
   return out.str();
 }
 
-// A repeatable value for any row and property, a whole multiple of 1/64 so that every encoding holds it exactly. Scales are negative,
-// rotations not zero.
+// A repeatable value for any row and property, a whole multiple of 1/64 so that every encoding
+// holds it exactly. Scales are negative, rotations not zero.
 inline double sample_value(size_t row, const std::string& name) {
   size_t hash = row * 31 + 7;
   for (const char c : name) hash = (hash * 131 + static_cast<unsigned char>(c)) % 100003;
@@ -76,7 +80,8 @@ inline double sample_value(size_t row, const std::string& name) {
   return value;
 }
 
-inline std::string sample_ply(int sh_degree, size_t rows = 5, PlyEncoding encoding = PlyEncoding::kLittle) {
+inline std::string sample_ply(int sh_degree, size_t rows = 5,
+                              PlyEncoding encoding = PlyEncoding::kLittle) {
   return make_ply(standard_columns(sh_degree), rows, encoding, sample_value);
 }
 

@@ -1,4 +1,5 @@
-// Runs the built figurine the way a user does, in a folder of its own with synthetic packages in it.
+// Runs the built figurine the way a user does, in a folder of its own with synthetic packages in
+// it.
 #pragma once
 
 #include <array>
@@ -44,13 +45,15 @@ struct RunOptions {
 ProgramRun run_figurine(const std::string& arguments, const RunOptions& options = {});
 ProgramRun run_shell(const std::string& command, const TestFolder& folder);
 
-// The avatar of write_test_packages with a golden picture in it, an 8-bit RGB PNG of its golden camera; empty: none. With
-// a hash, that is the golden frame's in fixed point, made by "a library".
-void write_golden_avatar(const TestFolder& folder, const std::string& name, const std::string& png, Held held = Held::kFloat32,
+// The avatar of write_test_packages with a golden picture in it, an 8-bit RGB PNG of its golden
+// camera; empty: none. With a hash, that is the golden frame's in fixed point, made by "a library".
+void write_golden_avatar(const TestFolder& folder, const std::string& name, const std::string& png,
+                         Held held = Held::kFloat32,
                          const std::array<uint64_t, 2>& fixed_point_hash = {0, 0});
 
-// Writes body.fgn, the avatar in float (avatar.fgn), in fixed point (fixed.fgn) and in both (both.fgn), motion.fgn (12 frames, 30 a
-// second), other_body.fgn, which does not fit the avatar, and people.fgn, a population of "ada" and "bob".
+// Writes body.fgn, the avatar in float (avatar.fgn), in fixed point (fixed.fgn) and in both
+// (both.fgn), motion.fgn (12 frames, 30 a second), other_body.fgn, which does not fit the avatar,
+// and people.fgn, a population of "ada" and "bob".
 void write_test_packages(const TestFolder& folder);
 
 }  // namespace figurine::tests

@@ -1,5 +1,6 @@
-// figurine sample from end to end, on a sampler of random numbers for the test body: the same file for the same seed, what the file says of
-// itself, the trace, and everything that must be refused without a file.
+// figurine sample from end to end, on a sampler of random numbers for the test body: the same file
+// for the same seed, what the file says of itself, the trace, and everything that must be refused
+// without a file.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -32,16 +33,20 @@ class SampleCommand : public testing::Test {
     sampler.golden = like.golden;
     sampler.golden.png = {};
     sampler.steps = 6;
-    if (golden != std::array<uint64_t, 2>{0, 0}) sampler.golden_seeds.push_back({.seed = 0, .steps = 6, .hash = golden});
+    if (golden != std::array<uint64_t, 2>{0, 0})
+      sampler.golden_seeds.push_back({.seed = 0, .steps = 6, .hash = golden});
     const auto bytes = write_sampler_package(sampler, *body.package);
     ASSERT_TRUE(bytes.ok()) << bytes.status().message();
     ASSERT_TRUE(ports::write_file_atomically(folder_.path(name), *bytes).ok());
   }
 
-  static Result<std::vector<std::byte>> write_sampler_package(const Sampler& sampler, const Package& body) {
-    return figurine::write_sampler({.sampler = &sampler,
-                                    .budget = {.gaussians = body.body().texel_count()},
-                                    .provenance = {.tool = "test", .licence_name = "CC0-1.0", .depicted_person = "synthetic"}});
+  static Result<std::vector<std::byte>> write_sampler_package(const Sampler& sampler,
+                                                              const Package& body) {
+    return figurine::write_sampler(
+        {.sampler = &sampler,
+         .budget = {.gaussians = body.body().texel_count()},
+         .provenance = {
+             .tool = "test", .licence_name = "CC0-1.0", .depicted_person = "synthetic"}});
   }
 
   void SetUp() override {
@@ -66,17 +71,22 @@ TEST_F(SampleCommand, TheSameSeedIsTheSameFile) {
 
 TEST_F(SampleCommand, WhatIsSampledPassesItsSelftestAndIsDrawn) {
   for (const char* precision : {"q8", "f32,q8"}) {
-    ASSERT_EQ(run(std::string("sample crowd.fgn --seed 7 -o a.fgn --precision ") + precision).exit_code, 0) << precision;
+    ASSERT_EQ(
+        run(std::string("sample crowd.fgn --seed 7 -o a.fgn --precision ") + precision).exit_code,
+        0)
+        << precision;
     const ProgramRun selftest = run("selftest a.fgn --precision q8");
     EXPECT_EQ(selftest.exit_code, 0) << selftest.err;
-    EXPECT_EQ(run("render a.fgn --motion motion.fgn --frames 0 --size 64x64 -o a.png").exit_code, 0);
+    EXPECT_EQ(run("render a.fgn --motion motion.fgn --frames 0 --size 64x64 -o a.png").exit_code,
+              0);
   }
   ASSERT_EQ(run("sample crowd.fgn --seed 7 -o f.fgn --precision f32").exit_code, 0);
   EXPECT_EQ(run("render f.fgn --size 64x64 -o f.png").exit_code, 0);
 }
 
 TEST_F(SampleCommand, JsonSaysSeedSolverAndCost) {
-  const ProgramRun json_run = run("sample crowd.fgn --seed 7 --steps 4 --solver ddim --json -o a.fgn");
+  const ProgramRun json_run =
+      run("sample crowd.fgn --seed 7 --steps 4 --solver ddim --json -o a.fgn");
   ASSERT_EQ(json_run.exit_code, 0) << json_run.err;
   const nlohmann::json json = nlohmann::json::parse(json_run.out);
   EXPECT_EQ(json.at("command"), "sample");
@@ -117,7 +127,8 @@ TEST_F(SampleCommand, GoldenSeedsAreHeldAgainstThisDevice) {
 
   const ProgramRun sampled = run("sample crowd.fgn --seed 0 --json -o x.fgn");
   const auto hex = nlohmann::json::parse(sampled.out).at("weights_hash").get<std::string>();
-  const std::array<uint64_t, 2> hash = {std::stoull(hex.substr(16), nullptr, 16), std::stoull(hex.substr(0, 16), nullptr, 16)};
+  const std::array<uint64_t, 2> hash = {std::stoull(hex.substr(16), nullptr, 16),
+                                        std::stoull(hex.substr(0, 16), nullptr, 16)};
   ASSERT_EQ(format_hash(hash), hex);
   write_sampler("golden.fgn", hash);
   const ProgramRun right = run("selftest golden.fgn --json");
@@ -142,7 +153,8 @@ TEST_F(SampleCommand, TheReportHasADialForEachSolver) {
     EXPECT_EQ(settings.front().at("work").at("evaluations"), 1);
     EXPECT_EQ(settings.back().at("work").at("evaluations"), 250);
     EXPECT_LT(settings.back().at("rmse").get<double>(), settings.front().at("rmse").get<double>());
-    EXPECT_GT(settings.back().at("work").at("macs").get<uint64_t>(), settings.front().at("work").at("macs").get<uint64_t>());
+    EXPECT_GT(settings.back().at("work").at("macs").get<uint64_t>(),
+              settings.front().at("work").at("macs").get<uint64_t>());
   }
   EXPECT_NE(folder_.read("report/report.html").find("seed 0, the reference"), std::string::npos);
   EXPECT_EQ(run("report crowd.fgn --body other_body.fgn -o nowhere").exit_code, 1);
@@ -173,17 +185,19 @@ TEST_F(SampleCommand, BadInputGetsOneLineAndNoFile) {
 }
 
 TEST_F(SampleCommand, AMalformedCommandLineIsUsage) {
-  for (const char* arguments :
-       {"sample crowd.fgn -o x.fgn", "sample crowd.fgn --seed -1 -o x.fgn", "sample crowd.fgn --seed 1 --steps 0 -o x.fgn",
-        "sample crowd.fgn --seed 1 --steps 1001 -o x.fgn", "sample crowd.fgn --seed 1 --solver euler -o x.fgn",
-        "sample crowd.fgn --seed 1 --to 2 --mix 1.5 -o x.fgn"}) {
+  for (const char* arguments : {"sample crowd.fgn -o x.fgn", "sample crowd.fgn --seed -1 -o x.fgn",
+                                "sample crowd.fgn --seed 1 --steps 0 -o x.fgn",
+                                "sample crowd.fgn --seed 1 --steps 1001 -o x.fgn",
+                                "sample crowd.fgn --seed 1 --solver euler -o x.fgn",
+                                "sample crowd.fgn --seed 1 --to 2 --mix 1.5 -o x.fgn"}) {
     EXPECT_EQ(run(arguments).exit_code, 2) << arguments;
   }
 }
 
 TEST_F(SampleCommand, AFullDiskLeavesNothing) {
   const std::vector<std::string> before = folder_.names();
-  const ProgramRun result = run("sample crowd.fgn --seed 1 --precision f32,q8 -o x.fgn", "trap '' XFSZ; ulimit -f 1;");
+  const ProgramRun result =
+      run("sample crowd.fgn --seed 1 --precision f32,q8 -o x.fgn", "trap '' XFSZ; ulimit -f 1;");
   EXPECT_EQ(result.exit_code, 1) << result.err;
   EXPECT_EQ(folder_.names(), before);
 }

@@ -1,6 +1,8 @@
-// figurine-stability: measures every case and writes the table with what it was measured on. stability_test asserts the same rows.
+// figurine-stability: measures every case and writes the table with what it was measured on.
+// stability_test asserts the same rows.
 //
-//   figurine-stability [-o docs/results/stability.json]         exit code 0 if every bound holds, 1 if not, 2 on wrong usage
+//   figurine-stability [-o docs/results/stability.json]         exit code 0 if every bound holds, 1
+//   if not, 2 on wrong usage
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -20,7 +22,8 @@ using Json = nlohmann::ordered_json;
 std::string first_line_of(const char* command) {
   std::string line;
   if (FILE* pipe = popen(command, "r")) {
-    for (int c = std::fgetc(pipe); c != EOF && c != '\n'; c = std::fgetc(pipe)) line += static_cast<char>(c);
+    for (int c = std::fgetc(pipe); c != EOF && c != '\n'; c = std::fgetc(pipe))
+      line += static_cast<char>(c);
     pclose(pipe);
   }
   return line;
@@ -41,7 +44,9 @@ std::string date() {
   return text;
 }
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(std::to_string(value)); }
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(std::to_string(value));
+}
 
 // One line a row: a table to read and to compare.
 std::string layout(const Json& report) {
@@ -60,36 +65,41 @@ std::string layout(const Json& report) {
 
 int run(const std::string& output) {
   Json report{{"command", "figurine-stability -o docs/results/stability.json"},
-              {"commit", first_line_of("git -c safe.directory='*' -C '" FIGURINE_SOURCE_DIR "' rev-parse --short=12 HEAD 2> /dev/null")},
+              {"commit", first_line_of("git -c safe.directory='*' -C '" FIGURINE_SOURCE_DIR
+                                       "' rev-parse --short=12 HEAD 2> /dev/null")},
               {"machine", cpu_name()},
               {"date", date()},
               {"rows", Json::array()}};
   size_t broken = 0;
-  for (std::span<const Case> cases :
-       {splat_cases(), pose_cases(), package_cases(), fixed_point_cases(), sampling_cases(), sampler_cases()}) {
+  for (std::span<const Case> cases : {splat_cases(), pose_cases(), package_cases(),
+                                      fixed_point_cases(), sampling_cases(), sampler_cases()}) {
     for (const Case& one : cases) {
       for (const Row& row : one.run()) {
-        report["rows"].push_back({{"group", one.name},
-                                  {"case", row.name},
-                                  {"measure", row.measure},
-                                  {"bound", {{row.bound == Bound::kAtLeast ? "at_least" : "at_most", row.limit}}},
-                                  {"value", number(row.value)},
-                                  {"ok", row.ok()}});
+        report["rows"].push_back(
+            {{"group", one.name},
+             {"case", row.name},
+             {"measure", row.measure},
+             {"bound", {{row.bound == Bound::kAtLeast ? "at_least" : "at_most", row.limit}}},
+             {"value", number(row.value)},
+             {"ok", row.ok()}});
         if (row.ok()) continue;
         ++broken;
-        std::cerr << "figurine-stability: " << row.name << ": " << row.measure << ": " << row.value << " breaks its bound of " << row.limit
-                  << '\n';
+        std::cerr << "figurine-stability: " << row.name << ": " << row.measure << ": " << row.value
+                  << " breaks its bound of " << row.limit << '\n';
       }
     }
   }
   std::string text = layout(report);
   if (output.empty()) {
     std::cout << text;
-  } else if (const Status status = ports::write_file_atomically(output, std::as_bytes(std::span(text))); !status.ok()) {
+  } else if (const Status status =
+                 ports::write_file_atomically(output, std::as_bytes(std::span(text)));
+             !status.ok()) {
     std::cerr << "figurine-stability: " << status.message() << '\n';
     return 1;
   }
-  std::cerr << "figurine-stability: " << report["rows"].size() << " rows, " << broken << " broken\n";
+  std::cerr << "figurine-stability: " << report["rows"].size() << " rows, " << broken
+            << " broken\n";
   return broken == 0 ? 0 : 1;
 }
 

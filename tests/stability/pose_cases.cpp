@@ -1,5 +1,6 @@
-// Poses and networks far from anything trained, through packages and the whole renderer: twists, rotations that are none, heads that
-// overflow. The body is the five texels of docs/numerics.md, whose every step can be followed in double.
+// Poses and networks far from anything trained, through packages and the whole renderer: twists,
+// rotations that are none, heads that overflow. The body is the five texels of docs/numerics.md,
+// whose every step can be followed in double.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -21,15 +22,19 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 class Stage {  // the example's avatar on a renderer; example may be changed before
  public:
-  explicit Stage(const FiveTexels& example) : packages_(example), renderer_(std::move(Renderer::create({})).value()) {
+  explicit Stage(const FiveTexels& example)
+      : packages_(example), renderer_(std::move(Renderer::create({})).value()) {
     avatar_ = renderer_->add_avatar(packages_.avatar(), packages_.body()).value();
   }
   Result<GaussianView> pose(const PoseView& pose) { return renderer_->pose_avatar(avatar_, pose); }
   Status draw(const PoseView& pose, const Camera& camera, std::vector<float>& rgba) {
     rgba.resize(size_t(camera.width_px) * camera.height_px * 4);
     const FrameAvatar seen[] = {{.avatar = avatar_, .pose = pose}};
-    return renderer_->render({.camera = camera, .avatars = seen, .gaussians = {}, .background = {}, .splat = {}},
-                             {.pixels = rgba.data(), .stride_bytes = 16 * size_t(camera.width_px), .format = PixelFormat::kRgbaF32});
+    return renderer_->render(
+        {.camera = camera, .avatars = seen, .gaussians = {}, .background = {}, .splat = {}},
+        {.pixels = rgba.data(),
+         .stride_bytes = 16 * size_t(camera.width_px),
+         .format = PixelFormat::kRgbaF32});
   }
 
  private:
@@ -39,12 +44,12 @@ class Stage {  // the example's avatar on a renderer; example may be changed bef
 };
 
 size_t not_finite(const GaussianView& view) {
-  return count_not_finite(view.position_m) + count_not_finite(view.covariance_factor) + count_not_finite(view.opacity) +
-         count_not_finite(view.sh);
+  return count_not_finite(view.position_m) + count_not_finite(view.covariance_factor) +
+         count_not_finite(view.opacity) + count_not_finite(view.sh);
 }
 
-// Largest difference from the double pipeline: centres in metres, factors in shares of the largest entry of a sound Gaussian (spacing times
-// e^4 at most).
+// Largest difference from the double pipeline: centres in metres, factors in shares of the largest
+// entry of a sound Gaussian (spacing times e^4 at most).
 struct PoseError {
   double centre_m = 0, factor = 0;
   size_t not_finite = 0;
@@ -54,8 +59,12 @@ struct PoseError {
     for (size_t i = 0; i < expected.size(); ++i) {
       double size = 0;
       for (double value : expected[i].factor) size = std::max(size, std::abs(value));
-      for (size_t k = 0; k < 3; ++k) centre_m = std::max(centre_m, std::abs(view.position_m[3 * i + k] - expected[i].centre_m[k]));
-      for (size_t k = 0; k < 9; ++k) factor = std::max(factor, std::abs(view.covariance_factor[9 * i + k] - expected[i].factor[k]) / size);
+      for (size_t k = 0; k < 3; ++k)
+        centre_m =
+            std::max(centre_m, std::abs(view.position_m[3 * i + k] - expected[i].centre_m[k]));
+      for (size_t k = 0; k < 9; ++k)
+        factor = std::max(
+            factor, std::abs(view.covariance_factor[9 * i + k] - expected[i].factor[k]) / size);
     }
   }
 };
@@ -66,7 +75,8 @@ Rows twists() {
   PoseError error;
   std::vector<float> rgba;
   size_t pixels_not_finite = 0;
-  // Joint 1 turned by 180 degrees and 1e-6 to 1e-2 radians around it, about each axis: texels 1, 2 and 3 blend opposite rotations.
+  // Joint 1 turned by 180 degrees and 1e-6 to 1e-2 radians around it, about each axis: texels 1, 2
+  // and 3 blend opposite rotations.
   for (int axis = 0; axis < 3; ++axis) {
     for (double off : {0.0, 1e-6, -1e-6, 1e-4, 1e-2}) {
       for (size_t j = 0; j < 3; ++j) {
@@ -83,10 +93,14 @@ Rows twists() {
     }
   }
   return {
-      {"180-degree twists", "values of Gaussians that are not finite", Bound::kAtMost, 0, double(error.not_finite)},
-      {"180-degree twists", "pixel values that are not finite", Bound::kAtMost, 0, double(pixels_not_finite)},
-      {"180-degree twists", "largest error of a centre against float64 [m]", Bound::kAtMost, 2e-6, error.centre_m},
-      {"180-degree twists", "largest error of a factor against float64, share of its largest entry", Bound::kAtMost, 5e-6, error.factor}};
+      {"180-degree twists", "values of Gaussians that are not finite", Bound::kAtMost, 0,
+       double(error.not_finite)},
+      {"180-degree twists", "pixel values that are not finite", Bound::kAtMost, 0,
+       double(pixels_not_finite)},
+      {"180-degree twists", "largest error of a centre against float64 [m]", Bound::kAtMost, 2e-6,
+       error.centre_m},
+      {"180-degree twists", "largest error of a factor against float64, share of its largest entry",
+       Bound::kAtMost, 5e-6, error.factor}};
 }
 
 Rows rotations_that_are_none() {
@@ -108,11 +122,14 @@ Rows rotations_that_are_none() {
       example.rotations = sound;
       std::copy(bad.begin(), bad.end(), &example.rotations[4 * joint]);
       example.pose.rotations = example.rotations;
-      if (stage.draw(example.pose, example.camera, rgba).code() != StatusCode::kInvalidArgument) ++accepted;
+      if (stage.draw(example.pose, example.camera, rgba).code() != StatusCode::kInvalidArgument)
+        ++accepted;
     }
   }
-  return {{"21 poses with a zero, NaN or infinite quaternion", "poses not refused", Bound::kAtMost, 0, double(accepted)},
-          {"21 poses with a zero, NaN or infinite quaternion", "pixel values changed by a refused frame", Bound::kAtMost, 0,
+  return {{"21 poses with a zero, NaN or infinite quaternion", "poses not refused", Bound::kAtMost,
+           0, double(accepted)},
+          {"21 poses with a zero, NaN or infinite quaternion",
+           "pixel values changed by a refused frame", Bound::kAtMost, 0,
            double(count_different(before, rgba))}};
 }
 
@@ -125,16 +142,20 @@ Rows far_poses() {
     const double length = std::pow(10.0, random.uniform(-5, 14));
     for (size_t j = 0; j < 3; ++j) {
       const std::array<float, 4> q = random.quaternion();
-      for (size_t k = 0; k < 4; ++k) example.rotations[4 * j + k] = static_cast<float>(q[k] * length);
+      for (size_t k = 0; k < 4; ++k)
+        example.rotations[4 * j + k] = static_cast<float>(q[k] * length);
     }
     const Result<GaussianView> view = stage.pose(example.pose);
     if (!view.ok()) return {{"2,000 random poses", view.status().message(), Bound::kAtMost, 0, 1}};
     error.add(example, *view, example.pose);
   }
-  Rows rows{{"2,000 random poses of every joint", "values of Gaussians that are not finite", Bound::kAtMost, 0, double(error.not_finite)},
-            {"2,000 random poses of every joint", "largest error of a centre against float64 [m]", Bound::kAtMost, 3e-6, error.centre_m},
-            {"2,000 random poses of every joint", "largest error of a factor against float64, share of its largest entry", Bound::kAtMost,
-             1e-5, error.factor}};
+  Rows rows{{"2,000 random poses of every joint", "values of Gaussians that are not finite",
+             Bound::kAtMost, 0, double(error.not_finite)},
+            {"2,000 random poses of every joint", "largest error of a centre against float64 [m]",
+             Bound::kAtMost, 3e-6, error.centre_m},
+            {"2,000 random poses of every joint",
+             "largest error of a factor against float64, share of its largest entry",
+             Bound::kAtMost, 1e-5, error.factor}};
   example.rotations = golden::flatten<float>(example.document["pose"]["rotations"]);
   example.pose.rotations = example.rotations;
   for (const auto& [distance, limit] : {std::pair<float, double>{1000, 2.5e-4}, {1e6f, 0.25}}) {
@@ -143,18 +164,22 @@ Rows far_poses() {
     const Result<GaussianView> view = stage.pose(example.pose);
     far.add(example, *view, example.pose);
     const std::string name = "the root " + std::to_string(int(distance)) + " m away";
-    rows.push_back({name, "largest error of a centre against float64 [m]", Bound::kAtMost, limit, far.centre_m});
-    rows.push_back({name, "values of Gaussians that are not finite", Bound::kAtMost, 0, double(far.not_finite)});
+    rows.push_back({name, "largest error of a centre against float64 [m]", Bound::kAtMost, limit,
+                    far.centre_m});
+    rows.push_back({name, "values of Gaussians that are not finite", Bound::kAtMost, 0,
+                    double(far.not_finite)});
   }
   return rows;
 }
 
 Rows extreme_heads() {
   Rows rows;
-  // Outputs of 1e30: log-scales meet their bound, opacities are exactly 0 or 1, offsets throw the Gaussian out of sight; nothing may be NaN
-  // on the way to the picture. Outputs that overflow make NaN in the network; their Gaussians are left out.
+  // Outputs of 1e30: log-scales meet their bound, opacities are exactly 0 or 1, offsets throw the
+  // Gaussian out of sight; nothing may be NaN on the way to the picture. Outputs that overflow make
+  // NaN in the network; their Gaussians are left out.
   for (const auto& [name, magnitude] :
-       {std::pair<const char*, float>{"head outputs of 1e30", 1e30f}, {"head outputs that overflow", 3e38f}}) {
+       {std::pair<const char*, float>{"head outputs of 1e30", 1e30f},
+        {"head outputs that overflow", 3e38f}}) {
     FiveTexels example;
     for (size_t i = 0; i < example.network_bias.size(); ++i) {
       if (i >= 3) example.network_bias[i] = i % 2 == 0 ? magnitude : -magnitude;
@@ -166,13 +191,16 @@ Rows extreme_heads() {
     std::vector<float> rgba;
     const Status status = stage.draw(example.pose, example.camera, rgba);
     rows.push_back({name, "frames that fail", Bound::kAtMost, 0, status.ok() ? 0.0 : 1.0});
-    rows.push_back({name, "pixel values that are not finite", Bound::kAtMost, 0, double(count_not_finite(rgba))});
+    rows.push_back({name, "pixel values that are not finite", Bound::kAtMost, 0,
+                    double(count_not_finite(rgba))});
     if (magnitude < 1e38f) {
       double largest = 0, beyond = 0;
       const Result<GaussianView> view = stage.pose(example.pose);
-      for (float value : view->covariance_factor) largest = std::max(largest, double(std::abs(value)));
+      for (float value : view->covariance_factor)
+        largest = std::max(largest, double(std::abs(value)));
       for (float value : view->opacity) beyond += !(value >= 0 && value <= 1);
-      rows.push_back({name, "largest entry of a factor [m]; spacing_scale x 0.06 m x e^4 = 1.97", Bound::kAtMost, 1.97, largest});
+      rows.push_back({name, "largest entry of a factor [m]; spacing_scale x 0.06 m x e^4 = 1.97",
+                      Bound::kAtMost, 1.97, largest});
       rows.push_back({name, "opacities outside 0 to 1", Bound::kAtMost, 0, beyond});
     }
   }
@@ -187,7 +215,8 @@ Rows extreme_heads() {
   };
   const std::vector<float> identity = factors();
   example.network_bias[6] = -1;
-  rows.push_back({"a head whose quaternion is zero", "values of factors that differ from no rotation's", Bound::kAtMost, 0,
+  rows.push_back({"a head whose quaternion is zero",
+                  "values of factors that differ from no rotation's", Bound::kAtMost, 0,
                   double(count_different(identity, factors()))});
   return rows;
 }

@@ -1,4 +1,5 @@
-// What the stability cases measure: one row per claim, with its bound. The program writes them, the test asserts them.
+// What the stability cases measure: one row per claim, with its bound. The program writes them, the
+// test asserts them.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
-// The device's sampler beyond what a trained one is: any seed, any number of steps, denoisers that blow up, vanish or saturate.
+// The device's sampler beyond what a trained one is: any seed, any number of steps, denoisers that
+// blow up, vanish or saturate.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -28,12 +29,14 @@ Outcome sample(const Sampler& sampler, const SampleRequest& request) {
   Outcome outcome{AvatarSampler::create(sampler).value()->sample(request, person), 0, false};
   if (!outcome.status.ok()) return outcome;
   const Avatar& avatar = person.avatar();
-  for (const Layer& layer : avatar.network.layers) outcome.not_finite += count_not_finite(layer.weights) + count_not_finite(layer.bias);
+  for (const Layer& layer : avatar.network.layers)
+    outcome.not_finite += count_not_finite(layer.weights) + count_not_finite(layer.bias);
   outcome.is_sound = validate_fixed_point(avatar.network, avatar.fixed_point).ok();
   return outcome;
 }
 
-// Requests that must give an avatar: how many gave none, a value that is not finite, or unsound integers.
+// Requests that must give an avatar: how many gave none, a value that is not finite, or unsound
+// integers.
 size_t failures(const Sampler& sampler, std::span<const SampleRequest> requests) {
   size_t failed = 0;
   for (const SampleRequest& request : requests) {
@@ -46,19 +49,25 @@ size_t failures(const Sampler& sampler, std::span<const SampleRequest> requests)
 Rows every_request() {
   const RandomSampler sampler;
   std::vector<SampleRequest> seeds, steps, mixes;
-  for (const uint64_t seed : {uint64_t{0}, uint64_t{1}, uint64_t{1} << 32, std::numeric_limits<uint64_t>::max()})
+  for (const uint64_t seed :
+       {uint64_t{0}, uint64_t{1}, uint64_t{1} << 32, std::numeric_limits<uint64_t>::max()})
     seeds.push_back({.seed = seed});
   for (const SolverMethod method : {SolverMethod::kDdim, SolverMethod::kDpmSolverPlusPlus2M}) {
-    for (const uint32_t count : {1u, 2u, 3u, 250u, 1000u}) steps.push_back({.seed = 1, .steps = count, .method = method});
+    for (const uint32_t count : {1u, 2u, 3u, 250u, 1000u})
+      steps.push_back({.seed = 1, .steps = count, .method = method});
   }
-  for (const double mix : {0.0, 1e-300, 0.5, std::nextafter(1.0, 0.0), 1.0}) mixes.push_back({.seed = 1, .to = 2, .mix = mix});
-  return {
-      {"a sampler of random numbers, seeds 0 to 2^64 - 1", "avatars that fail", Bound::kAtMost, 0, double(failures(sampler.view, seeds))},
-      {"1 to 1000 evaluations, both solvers", "avatars that fail", Bound::kAtMost, 0, double(failures(sampler.view, steps))},
-      {"mixes of two seeds from 0 to 1", "avatars that fail", Bound::kAtMost, 0, double(failures(sampler.view, mixes))}};
+  for (const double mix : {0.0, 1e-300, 0.5, std::nextafter(1.0, 0.0), 1.0})
+    mixes.push_back({.seed = 1, .to = 2, .mix = mix});
+  return {{"a sampler of random numbers, seeds 0 to 2^64 - 1", "avatars that fail", Bound::kAtMost,
+           0, double(failures(sampler.view, seeds))},
+          {"1 to 1000 evaluations, both solvers", "avatars that fail", Bound::kAtMost, 0,
+           double(failures(sampler.view, steps))},
+          {"mixes of two seeds from 0 to 1", "avatars that fail", Bound::kAtMost, 0,
+           double(failures(sampler.view, mixes))}};
 }
 
-// Matrices a thousand times too large, far too small, and of nothing: the norms hold what lies between, and fixed point what comes out.
+// Matrices a thousand times too large, far too small, and of nothing: the norms hold what lies
+// between, and fixed point what comes out.
 Rows denoisers_out_of_scale() {
   Rows rows;
   for (const float contrast : {0.0f, 1e-20f, 1e-6f, 1e3f}) {
@@ -68,13 +77,16 @@ Rows denoisers_out_of_scale() {
     if (contrast == 0) std::fill(sampler.matrices.begin(), sampler.matrices.end(), int8_t{0});
     const SampleRequest request{.seed = 1};
     char name[96];
-    std::snprintf(name, sizeof(name), "a denoiser whose matrices are %g of their size", static_cast<double>(contrast));
-    rows.push_back({name, "avatars that fail", Bound::kAtMost, 0, double(failures(sampler.view, {&request, 1}))});
+    std::snprintf(name, sizeof(name), "a denoiser whose matrices are %g of their size",
+                  static_cast<double>(contrast));
+    rows.push_back({name, "avatars that fail", Bound::kAtMost, 0,
+                    double(failures(sampler.view, {&request, 1}))});
   }
   return rows;
 }
 
-// What cannot be a network in fixed point is an error in one line, never an avatar of NaN. A package's own floats end at 1e6.
+// What cannot be a network in fixed point is an error in one line, never an avatar of NaN. A
+// package's own floats end at 1e6.
 Rows denoisers_that_overflow() {
   size_t accepted = 0;
   for (const float scale : {1e6f, 1e30f, 3e38f}) {
@@ -83,10 +95,12 @@ Rows denoisers_that_overflow() {
     const Outcome outcome = sample(sampler.view, {.seed = 1});
     accepted += outcome.status.ok() && (outcome.not_finite > 0 || !outcome.is_sound) ? 1 : 0;
   }
-  return {{"a denoiser whose sums are beyond fixed point, or overflow float", "unsound avatars", Bound::kAtMost, 0, double(accepted)}};
+  return {{"a denoiser whose sums are beyond fixed point, or overflow float", "unsound avatars",
+           Bound::kAtMost, 0, double(accepted)}};
 }
 
-// The step of an int16 activation against the largest of its row, with one value a thousand times the others.
+// The step of an int16 activation against the largest of its row, with one value a thousand times
+// the others.
 Rows outliers_among_activations() {
   tests::RandomSamplerShape shape;
   shape.denoiser = {.d_model = 64, .blocks = 2, .heads = 4, .feed_forward = 1024};
@@ -103,8 +117,10 @@ Rows outliers_among_activations() {
     transformer->predict(z, 0, b);
     double error = 0, power = 0;
     for (size_t k = 0; k < size; ++k) error += std::pow(a[k] - b[k], 2), power += std::pow(a[k], 2);
-    rows.push_back({sampler == &plain ? "tokens as they come" : "tokens with one value a thousand times the others",
-                    "relative change of the prediction for a millionth of the input", Bound::kAtMost, 1e-2, std::sqrt(error / power)});
+    rows.push_back({sampler == &plain ? "tokens as they come"
+                                      : "tokens with one value a thousand times the others",
+                    "relative change of the prediction for a millionth of the input",
+                    Bound::kAtMost, 1e-2, std::sqrt(error / power)});
   }
   return rows;
 }

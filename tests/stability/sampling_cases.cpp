@@ -1,4 +1,5 @@
-// Sampling at its ends: pure noise, few and large steps into a stiff end, next to no noise; in float, as on the device.
+// Sampling at its ends: pure noise, few and large steps into a stiff end, next to no noise; in
+// float, as on the device.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -23,9 +24,12 @@ constexpr SolverMethod kMethods[] = {SolverMethod::kDdim, SolverMethod::kDpmSolv
 class NormalDenoiser : public Denoiser<float> {
  public:
   NormalDenoiser(double mean, double deviation) : mean_(mean), variance_(deviation * deviation) {}
-  Status predict(std::span<const float> z, const NoiseLevel& level, size_t, std::span<float> x0) override {
-    const double factor = level.alpha * variance_ / (level.alpha * level.alpha * variance_ + level.sigma * level.sigma);
-    for (size_t i = 0; i < z.size(); ++i) x0[i] = static_cast<float>(mean_ + factor * (z[i] - level.alpha * mean_));
+  Status predict(std::span<const float> z, const NoiseLevel& level, size_t,
+                 std::span<float> x0) override {
+    const double factor = level.alpha * variance_ /
+                          (level.alpha * level.alpha * variance_ + level.sigma * level.sigma);
+    for (size_t i = 0; i < z.size(); ++i)
+      x0[i] = static_cast<float>(mean_ + factor * (z[i] - level.alpha * mean_));
     return {};
   }
 
@@ -33,7 +37,8 @@ class NormalDenoiser : public Denoiser<float> {
   double mean_, variance_;
 };
 
-std::vector<NoiseLevel> levels_of(const NoiseScheduleOptions& options, size_t steps, bool pure_noise_start) {
+std::vector<NoiseLevel> levels_of(const NoiseScheduleOptions& options, size_t steps,
+                                  bool pure_noise_start) {
   std::vector<NoiseLevel> levels(steps + 1);
   solver_levels(NoiseSchedule::create(options).value(), pure_noise_start, levels);
   return levels;
@@ -46,7 +51,8 @@ std::vector<float> noise() {
 }
 
 // NaN where the run was refused.
-std::vector<float> sampled(const SolverOptions& options, std::span<const NoiseLevel> levels, Denoiser<float>& denoiser) {
+std::vector<float> sampled(const SolverOptions& options, std::span<const NoiseLevel> levels,
+                           Denoiser<float>& denoiser) {
   std::vector<float> z = noise(), x0(kValues, NAN), previous(kValues, NAN);
   if (!solve<float>(options, levels, denoiser, {x0, previous}, z).ok()) z.assign(kValues, NAN);
   return z;
@@ -55,14 +61,15 @@ std::vector<float> sampled(const SolverOptions& options, std::span<const NoiseLe
 Rows terminal_snr() {
   Rows rows;
   for (const uint64_t dimension : {1u, 9'886u, 156'000u, 598'011u}) {
-    const double placed = snr(NoiseSchedule::create({.dimension = dimension}).value().level(0)) * static_cast<double>(dimension);
-    rows.push_back(
-        {"noisy end of the levels for " + std::to_string(dimension) + " values", "D x SNR", Bound::kAtMost, 0.1 * (1 + 1e-12), placed});
+    const double placed = snr(NoiseSchedule::create({.dimension = dimension}).value().level(0)) *
+                          static_cast<double>(dimension);
+    rows.push_back({"noisy end of the levels for " + std::to_string(dimension) + " values",
+                    "D x SNR", Bound::kAtMost, 0.1 * (1 + 1e-12), placed});
   }
   std::vector<NoiseLevel> copied(501);
   linear_beta_levels(copied);
-  rows.push_back({"noisy end of the linear beta schedule for 156000 values, to compare with", "D x SNR", Bound::kAtLeast, 900,
-                  snr(copied[0]) * 156'000});
+  rows.push_back({"noisy end of the linear beta schedule for 156000 values, to compare with",
+                  "D x SNR", Bound::kAtLeast, 900, snr(copied[0]) * 156'000});
   return rows;
 }
 
@@ -77,14 +84,17 @@ Rows few_steps_into_a_stiff_end() {
           for (const bool pure_noise_start : {false, true}) {
             NormalDenoiser denoiser(1, deviation);
             const NoiseScheduleOptions options{.dimension = 156'000, .clean_snr = clean_snr};
-            const std::vector<float> z = sampled({method}, levels_of(options, steps, pure_noise_start), denoiser);
+            const std::vector<float> z =
+                sampled({method}, levels_of(options, steps, pure_noise_start), denoiser);
             not_finite += count_not_finite(z);
-            for (const float value : z) largest = std::max(largest, std::abs(static_cast<double>(value)));
+            for (const float value : z)
+              largest = std::max(largest, std::abs(static_cast<double>(value)));
           }
         }
       }
     }
-    const std::string name = std::to_string(steps) + (steps == 1 ? " step" : " steps") + " to SNR 1e4 and 1e12, deviations 0 to 1";
+    const std::string name = std::to_string(steps) + (steps == 1 ? " step" : " steps") +
+                             " to SNR 1e4 and 1e12, deviations 0 to 1";
     rows.push_back({name, "values that are not finite", Bound::kAtMost, 0, double(not_finite)});
     rows.push_back({name, "largest value, of a mean of 1", Bound::kAtMost, 10, largest});
   }
@@ -95,9 +105,11 @@ Rows last_step_near_no_noise() {
   Rows rows;
   const std::vector<float> start = noise();
   for (const double clean_snr : {1e4, 1e8, 1e16, double(INFINITY)}) {
-    std::vector<NoiseLevel> levels = levels_of({.dimension = 156'000, .clean_snr = std::min(clean_snr, 1e16)}, 50, false);
+    std::vector<NoiseLevel> levels =
+        levels_of({.dimension = 156'000, .clean_snr = std::min(clean_snr, 1e16)}, 50, false);
     if (std::isinf(clean_snr)) levels.back() = noise_level(INFINITY);
-    NormalDenoiser denoiser(1, 0);  // the same x0 everywhere: every solver is exact, and what is left is rounding
+    NormalDenoiser denoiser(
+        1, 0);  // the same x0 everywhere: every solver is exact, and what is left is rounding
     double largest = 0;
     for (const SolverMethod method : kMethods) {
       const std::vector<float> z = sampled({method}, levels, denoiser);
@@ -122,11 +134,14 @@ Rows first_step_from_pure_noise() {
   for (const SolverMethod method : kMethods) {
     const std::vector<float> z = sampled({method}, levels, denoiser);
     for (size_t i = 0; i < kValues; ++i) {
-      const double error = std::abs(z[i] - (levels[1].alpha * 1 + levels[1].sigma * start[i]));  // the mean is all that is known
+      const double error =
+          std::abs(z[i] - (levels[1].alpha * 1 +
+                           levels[1].sigma * start[i]));  // the mean is all that is known
       if (!(error <= largest)) largest = error;
     }
   }
-  return {{"first step from pure noise", "largest difference from alpha x0 + sigma z", Bound::kAtMost, 1e-6, largest}};
+  return {{"first step from pure noise", "largest difference from alpha x0 + sigma z",
+           Bound::kAtMost, 1e-6, largest}};
 }
 
 constexpr Case kCases[] = {{"SamplingTerminalSnr", terminal_snr},

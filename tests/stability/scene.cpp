@@ -19,7 +19,8 @@ namespace {
 
 }  // namespace
 
-void GaussianSet::add(const Vector& position, const std::array<float, 9>& factor, float opacity_value, const Vector& colour) {
+void GaussianSet::add(const Vector& position, const std::array<float, 9>& factor,
+                      float opacity_value, const Vector& colour) {
   position_m.insert(position_m.end(), position.begin(), position.end());
   covariance_factor.insert(covariance_factor.end(), factor.begin(), factor.end());
   opacity.push_back(opacity_value);
@@ -28,7 +29,8 @@ void GaussianSet::add(const Vector& position, const std::array<float, 9>& factor
 
 void GaussianSet::append(const GaussianSet& other) {
   position_m.insert(position_m.end(), other.position_m.begin(), other.position_m.end());
-  covariance_factor.insert(covariance_factor.end(), other.covariance_factor.begin(), other.covariance_factor.end());
+  covariance_factor.insert(covariance_factor.end(), other.covariance_factor.begin(),
+                           other.covariance_factor.end());
   opacity.insert(opacity.end(), other.opacity.begin(), other.opacity.end());
   sh.insert(sh.end(), other.sh.begin(), other.sh.end());
 }
@@ -61,29 +63,39 @@ GaussianSet make_cloud(const CloudOptions& options) {
   Random random(options.seed);
   for (uint32_t i = 0; i < options.count; ++i) {
     Vector position, colour;
-    for (int k = 0; k < 3; ++k) position[k] = options.centre_m[k] + static_cast<float>(random.uniform(-1, 1)) * options.half_size_m;
+    for (int k = 0; k < 3; ++k)
+      position[k] =
+          options.centre_m[k] + static_cast<float>(random.uniform(-1, 1)) * options.half_size_m;
     for (float& channel : colour) channel = static_cast<float>(random.uniform(0, 1));
-    const float opacity = static_cast<float>(random.uniform(options.opacity_low, options.opacity_high));
+    const float opacity =
+        static_cast<float>(random.uniform(options.opacity_low, options.opacity_high));
     set.add(position, factor_of(random.quaternion(), options.scale_m), opacity, colour);
   }
   return set;
 }
 
 Camera front_camera(uint32_t size_px, float distance_m, float vertical_fov_deg) {
-  const Result<Camera> camera = make_orbit_camera({.distance_m = distance_m, .vertical_fov_deg = vertical_fov_deg}, size_px, size_px);
+  const Result<Camera> camera = make_orbit_camera(
+      {.distance_m = distance_m, .vertical_fov_deg = vertical_fov_deg}, size_px, size_px);
   if (!camera.ok()) stop(camera.status());
   return *camera;
 }
 
-Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads, float alpha_cut) {
+Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads,
+             float alpha_cut) {
   const auto renderer = Renderer::create({.threads = threads});
   if (!renderer.ok()) stop(renderer.status());
   Picture picture;
   picture.rgba.assign(size_t(camera.width_px) * camera.height_px * 4,
                       std::numeric_limits<float>::quiet_NaN());  // every pixel must be written
-  const Status status = (*renderer)->render(
-      {.camera = camera, .avatars = {}, .gaussians = sets, .background = {}, .splat = {.alpha_cut = alpha_cut}},
-      {.pixels = picture.rgba.data(), .stride_bytes = 4 * sizeof(float) * camera.width_px, .format = PixelFormat::kRgbaF32});
+  const Status status = (*renderer)->render({.camera = camera,
+                                             .avatars = {},
+                                             .gaussians = sets,
+                                             .background = {},
+                                             .splat = {.alpha_cut = alpha_cut}},
+                                            {.pixels = picture.rgba.data(),
+                                             .stride_bytes = 4 * sizeof(float) * camera.width_px,
+                                             .format = PixelFormat::kRgbaF32});
   if (!status.ok()) stop(status);
   picture.statistics = (*renderer)->statistics();
   return picture;
@@ -115,19 +127,24 @@ Agreement compare_with_oracle(const GaussianSet& set, const Camera& camera) {
   return agreement;
 }
 
-void add_agreement(Rows& rows, const std::string& name, const GaussianSet& set, const Camera& camera, double at_least_db, double flip) {
+void add_agreement(Rows& rows, const std::string& name, const GaussianSet& set,
+                   const Camera& camera, double at_least_db, double flip) {
   const Agreement agreement = compare_with_oracle(set, camera);
-  rows.push_back({name, "foreground psnr_db against the float64 oracle", Bound::kAtLeast, at_least_db, agreement.psnr_db});
-  rows.push_back({name, "largest difference of a premultiplied channel from the float64 oracle", Bound::kAtMost, flip, agreement.largest});
+  rows.push_back({name, "foreground psnr_db against the float64 oracle", Bound::kAtLeast,
+                  at_least_db, agreement.psnr_db});
+  rows.push_back({name, "largest difference of a premultiplied channel from the float64 oracle",
+                  Bound::kAtMost, flip, agreement.largest});
 }
 
 size_t count_not_finite(std::span<const float> values) {
-  return static_cast<size_t>(std::count_if(values.begin(), values.end(), [](float value) { return !std::isfinite(value); }));
+  return static_cast<size_t>(std::count_if(values.begin(), values.end(),
+                                           [](float value) { return !std::isfinite(value); }));
 }
 
 size_t count_different(std::span<const float> a, std::span<const float> b) {
   size_t different = a.size() > b.size() ? a.size() - b.size() : b.size() - a.size();
-  for (size_t i = 0; i < std::min(a.size(), b.size()); ++i) different += std::memcmp(&a[i], &b[i], sizeof(float)) != 0;
+  for (size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+    different += std::memcmp(&a[i], &b[i], sizeof(float)) != 0;
   return different;
 }
 

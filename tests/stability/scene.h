@@ -1,4 +1,5 @@
-// Sets of Gaussians, and the two renderers that are held against each other: the device's in float, the brute-force oracle in double.
+// Sets of Gaussians, and the two renderers that are held against each other: the device's in float,
+// the brute-force oracle in double.
 #pragma once
 
 #include <array>
@@ -18,8 +19,11 @@ struct GaussianSet {
   std::vector<float> position_m, covariance_factor, opacity, sh;
 
   uint32_t count() const { return static_cast<uint32_t>(opacity.size()); }
-  GaussianView view() const { return {count(), sh_degree, position_m, covariance_factor, opacity, sh}; }
-  void add(const Vector& position, const std::array<float, 9>& factor, float opacity, const Vector& colour);  // degree 0
+  GaussianView view() const {
+    return {count(), sh_degree, position_m, covariance_factor, opacity, sh};
+  }
+  void add(const Vector& position, const std::array<float, 9>& factor, float opacity,
+           const Vector& colour);  // degree 0
   void append(const GaussianSet& other);
 };
 
@@ -54,19 +58,24 @@ struct Picture {
   std::vector<float> rgba;  // [h,w,4] straight colour
   FrameStatistics statistics;
 };
-Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads = 1, float alpha_cut = kAlphaCut);
+Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads = 1,
+             float alpha_cut = kAlphaCut);
 Picture draw(const GaussianSet& set, const Camera& camera);
 
 struct Agreement {
-  double psnr_db = 0;  // over pixels whose true alpha exceeds 0.5, over mid-grey; at most 200, NaN if there are fewer than 20 such pixels
-  double largest = 0;  // premultiplied colours and alpha, over all pixels; NaN if anything is not finite
+  double psnr_db = 0;  // over pixels whose true alpha exceeds 0.5, over mid-grey; at most 200, NaN
+                       // if there are fewer than 20 such pixels
+  double largest =
+      0;  // premultiplied colours and alpha, over all pixels; NaN if anything is not finite
   size_t foreground = 0;  // pixels
   size_t not_finite = 0;  // values
 };
 Agreement compare_with_oracle(const GaussianSet& set, const Camera& camera);
 
-// The two usual rows of a scene. flip: what one contribution at the cut, or one at the stop of an opaque pixel, may change.
-void add_agreement(Rows& rows, const std::string& name, const GaussianSet& set, const Camera& camera, double at_least_db, double flip);
+// The two usual rows of a scene. flip: what one contribution at the cut, or one at the stop of an
+// opaque pixel, may change.
+void add_agreement(Rows& rows, const std::string& name, const GaussianSet& set,
+                   const Camera& camera, double at_least_db, double flip);
 
 size_t count_not_finite(std::span<const float> values);
 size_t count_different(std::span<const float> a, std::span<const float> b);  // bitwise

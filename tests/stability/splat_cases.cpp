@@ -1,6 +1,7 @@
-// The splatter where it is easiest to break: degenerate covariances, the near plane, extreme sizes, opacities, distances and lenses,
-// denormals, numbers that are none. Each scene is drawn by the device's renderer and, where a reference is meaningful, by the float64
-// oracle with the same cuts and order.
+// The splatter where it is easiest to break: degenerate covariances, the near plane, extreme sizes,
+// opacities, distances and lenses, denormals, numbers that are none. Each scene is drawn by the
+// device's renderer and, where a reference is meaningful, by the float64 oracle with the same cuts
+// and order.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,13 +15,17 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
 
-// One contribution at the cut: 1/255 of a colour up to 1, with a little room for a second one far behind.
+// One contribution at the cut: 1/255 of a colour up to 1, with a little room for a second one far
+// behind.
 constexpr double kCutFlip = 0.0045;
-// One contribution at the stop of a nearly opaque pixel: T alpha with T just above 1e-4 / (1 - 0.99).
+// One contribution at the stop of a nearly opaque pixel: T alpha with T just above 1e-4 / (1 -
+// 0.99).
 constexpr double kStopFlip = 0.0102;
 
 // What the inner loops rely on for speed must not decide the picture.
-double visible_share(const Picture& picture) { return double(picture.statistics.visible) / double(picture.statistics.gaussians); }
+double visible_share(const Picture& picture) {
+  return double(picture.statistics.visible) / double(picture.statistics.gaussians);
+}
 
 size_t drawn_pixels(const Picture& picture) {
   size_t drawn = 0;
@@ -31,19 +36,27 @@ size_t drawn_pixels(const Picture& picture) {
 Rows near_singular() {
   Rows rows;
   const Camera camera = front_camera();
-  add_agreement(rows, "discs of thickness 1e-7 m", make_cloud({.scale_m = {0.02f, 0.02f, 1e-7f}}), camera, 105, kCutFlip);
-  add_agreement(rows, "discs of thickness 0", make_cloud({.scale_m = {0.02f, 0.02f, 0}}), camera, 105, kCutFlip);
-  add_agreement(rows, "lines of thickness 0", make_cloud({.scale_m = {0.05f, 0, 0}}), camera, 105, kCutFlip);
-  add_agreement(rows, "points of extent 0", make_cloud({.count = 20000, .half_size_m = 0.4f, .scale_m = {0, 0, 0}}), camera, 105, kCutFlip);
+  add_agreement(rows, "discs of thickness 1e-7 m", make_cloud({.scale_m = {0.02f, 0.02f, 1e-7f}}),
+                camera, 105, kCutFlip);
+  add_agreement(rows, "discs of thickness 0", make_cloud({.scale_m = {0.02f, 0.02f, 0}}), camera,
+                105, kCutFlip);
+  add_agreement(rows, "lines of thickness 0", make_cloud({.scale_m = {0.05f, 0, 0}}), camera, 105,
+                kCutFlip);
+  add_agreement(rows, "points of extent 0",
+                make_cloud({.count = 20000, .half_size_m = 0.4f, .scale_m = {0, 0, 0}}), camera,
+                105, kCutFlip);
   return rows;
 }
 
 Rows needles() {
   Rows rows;
   const Camera camera = front_camera();
-  add_agreement(rows, "needles of 0.5 m by 5 um", make_cloud({.scale_m = {0.5f, 5e-6f, 5e-6f}}), camera, 90, kStopFlip);
-  // 600 px long and dilated to 0.55 px: alpha changes by 1 within a pixel while the mean lies up to 1,000 px away.
-  add_agreement(rows, "needles of 5 m by 5 nm", make_cloud({.count = 500, .scale_m = {5, 5e-9f, 5e-9f}}), camera, 90, kStopFlip);
+  add_agreement(rows, "needles of 0.5 m by 5 um", make_cloud({.scale_m = {0.5f, 5e-6f, 5e-6f}}),
+                camera, 90, kStopFlip);
+  // 600 px long and dilated to 0.55 px: alpha changes by 1 within a pixel while the mean lies up to
+  // 1,000 px away.
+  add_agreement(rows, "needles of 5 m by 5 nm",
+                make_cloud({.count = 500, .scale_m = {5, 5e-9f, 5e-9f}}), camera, 90, kStopFlip);
   return rows;
 }
 
@@ -52,68 +65,90 @@ Rows near_plane() {
   Camera camera = front_camera(256, 1);
   GaussianSet set, behind;
   Random random(2);
-  for (int i = 0; i < 200; ++i) {  // on the near plane to the last bit, and up to a millimetre around it
-    const float off = static_cast<float>(random.uniform(-1, 1)) * (i % 4 == 0 ? 0 : i % 4 == 1 ? 1e-7f : 1e-3f);
-    const Vector position{static_cast<float>(random.uniform(-0.05, 0.05)), static_cast<float>(random.uniform(-0.05, 0.05)), 0.8f + off};
-    set.add(position, factor_of(random.quaternion(), {0.003f, 0.002f, 0.001f}), 0.5f, {0.2f, 0.5f, 0.9f});
-    behind.add({position[0], position[1], 0.8001f}, factor_of(random.quaternion(), {0.003f, 0.002f, 0.001f}), 0.5f, {1, 0, 0});
+  for (int i = 0; i < 200;
+       ++i) {  // on the near plane to the last bit, and up to a millimetre around it
+    const float off = static_cast<float>(random.uniform(-1, 1)) * (i % 4 == 0   ? 0
+                                                                   : i % 4 == 1 ? 1e-7f
+                                                                                : 1e-3f);
+    const Vector position{static_cast<float>(random.uniform(-0.05, 0.05)),
+                          static_cast<float>(random.uniform(-0.05, 0.05)), 0.8f + off};
+    set.add(position, factor_of(random.quaternion(), {0.003f, 0.002f, 0.001f}), 0.5f,
+            {0.2f, 0.5f, 0.9f});
+    behind.add({position[0], position[1], 0.8001f},
+               factor_of(random.quaternion(), {0.003f, 0.002f, 0.001f}), 0.5f, {1, 0, 0});
   }
   add_agreement(rows, "Gaussians on the near plane of 0.2 m", set, camera, 105, kCutFlip);
-  rows.push_back({"Gaussians 0.1 mm before the near plane", "pixels drawn", Bound::kAtMost, 0, double(drawn_pixels(draw(behind, camera)))});
+  rows.push_back({"Gaussians 0.1 mm before the near plane", "pixels drawn", Bound::kAtMost, 0,
+                  double(drawn_pixels(draw(behind, camera)))});
   camera.near_m = 0.001f;
   GaussianSet close;
   for (int i = 0; i < 300; ++i) {
     const float depth = static_cast<float>(random.uniform(0.0010001, 0.02));
     const float aside = 0.3f * depth;
-    close.add({static_cast<float>(random.uniform(-aside, aside)), static_cast<float>(random.uniform(-aside, aside)), 1 - depth},
-              factor_of(random.quaternion(), {0.0005f, 0.0005f, 0.0002f}), 0.4f, {0.9f, 0.5f, 0.1f});
+    close.add({static_cast<float>(random.uniform(-aside, aside)),
+               static_cast<float>(random.uniform(-aside, aside)), 1 - depth},
+              factor_of(random.quaternion(), {0.0005f, 0.0005f, 0.0002f}), 0.4f,
+              {0.9f, 0.5f, 0.1f});
   }
-  add_agreement(rows, "Gaussians 1 to 20 mm before the camera, near plane at 1 mm", close, camera, 105, kStopFlip);
+  add_agreement(rows, "Gaussians 1 to 20 mm before the camera, near plane at 1 mm", close, camera,
+                105, kStopFlip);
   return rows;
 }
 
 Rows behind_the_camera() {
   GaussianSet set = make_cloud({.centre_m = {0, 0, 5}, .scale_m = {0.5f, 0.5f, 0.5f}});
-  for (float depth : {0.0f, 1e-30f, -1e-30f, -1e30f}) set.add({0, 0, 3 - depth}, factor_of({1, 0, 0, 0}, {1, 1, 1}), 1, {1, 1, 1});
+  for (float depth : {0.0f, 1e-30f, -1e-30f, -1e30f})
+    set.add({0, 0, 3 - depth}, factor_of({1, 0, 0, 0}, {1, 1, 1}), 1, {1, 1, 1});
   const Picture picture = draw(set, front_camera());
-  return {{"Gaussians behind the camera and in its plane", "pixels drawn", Bound::kAtMost, 0, double(drawn_pixels(picture))},
-          {"Gaussians behind the camera and in its plane", "Gaussians left after culling", Bound::kAtMost, 0,
-           double(picture.statistics.visible)}};
+  return {{"Gaussians behind the camera and in its plane", "pixels drawn", Bound::kAtMost, 0,
+           double(drawn_pixels(picture))},
+          {"Gaussians behind the camera and in its plane", "Gaussians left after culling",
+           Bound::kAtMost, 0, double(picture.statistics.visible)}};
 }
 
 Rows below_a_pixel() {
   Rows rows;
   add_agreement(rows, "Gaussians of 1 um at 3 m (a pixel is 8.5 mm)",
-                make_cloud({.count = 20000, .half_size_m = 0.4f, .scale_m = {1e-6f, 1e-6f, 1e-6f}}), front_camera(), 105, kCutFlip);
-  // A Gaussian that the 0.3 px^2 dilation has made wide enough for the pixel grid weighs the same wherever it falls between pixel centres.
+                make_cloud({.count = 20000, .half_size_m = 0.4f, .scale_m = {1e-6f, 1e-6f, 1e-6f}}),
+                front_camera(), 105, kCutFlip);
+  // A Gaussian that the 0.3 px^2 dilation has made wide enough for the pixel grid weighs the same
+  // wherever it falls between pixel centres.
   double least = kInfinity, most = 0;
   for (int step = 0; step < 64; ++step) {
     GaussianSet one;
     const float pixel_m = 3 / front_camera(64).fx_px;
-    one.add({(float(step % 8) / 8) * pixel_m, (float(step / 8) / 8) * pixel_m, 0}, factor_of({1, 0, 0, 0}, {1e-6f, 1e-6f, 1e-6f}), 0.9f,
-            {1, 1, 1});
+    one.add({(float(step % 8) / 8) * pixel_m, (float(step / 8) / 8) * pixel_m, 0},
+            factor_of({1, 0, 0, 0}, {1e-6f, 1e-6f, 1e-6f}), 0.9f, {1, 1, 1});
     const Picture picture = draw(one, front_camera(64));
     double weight = 0;
     for (size_t i = 3; i < picture.rgba.size(); i += 4) weight += picture.rgba[i];
     least = std::min(least, weight);
     most = std::max(most, weight);
   }
-  rows.push_back(
-      {"a Gaussian of 1 um moving through a pixel", "relative change of its summed alpha", Bound::kAtMost, 0.03, (most - least) / most});
+  rows.push_back({"a Gaussian of 1 um moving through a pixel",
+                  "relative change of its summed alpha", Bound::kAtMost, 0.03,
+                  (most - least) / most});
   return rows;
 }
 
 Rows above_the_screen() {
   Rows rows;
   const Camera camera = front_camera();
-  add_agreement(rows, "Gaussians of 100 m before the camera",
-                make_cloud({.count = 50, .scale_m = {100, 80, 60}, .opacity_low = 0.02, .opacity_high = 0.2}), camera, 105, kCutFlip);
-  add_agreement(rows, "Gaussians of 1,000 km",
-                make_cloud({.count = 50, .scale_m = {1e6f, 1e6f, 1e6f}, .opacity_low = 0.02, .opacity_high = 0.2}), camera, 105, kCutFlip);
+  add_agreement(
+      rows, "Gaussians of 100 m before the camera",
+      make_cloud({.count = 50, .scale_m = {100, 80, 60}, .opacity_low = 0.02, .opacity_high = 0.2}),
+      camera, 105, kCutFlip);
+  add_agreement(
+      rows, "Gaussians of 1,000 km",
+      make_cloud(
+          {.count = 50, .scale_m = {1e6f, 1e6f, 1e6f}, .opacity_low = 0.02, .opacity_high = 0.2}),
+      camera, 105, kCutFlip);
   GaussianSet cloud = make_cloud({});
   const Picture without = draw(cloud, camera);
-  cloud.append(make_cloud({.count = 50, .scale_m = {1e25f, 1e25f, 1e25f}}));  // the projected determinant has no float
-  rows.push_back({"Gaussians whose projection overflows float", "values that differ from the picture without them", Bound::kAtMost, 0,
+  cloud.append(make_cloud(
+      {.count = 50, .scale_m = {1e25f, 1e25f, 1e25f}}));  // the projected determinant has no float
+  rows.push_back({"Gaussians whose projection overflows float",
+                  "values that differ from the picture without them", Bound::kAtMost, 0,
                   double(count_different(without.rgba, draw(cloud, camera).rgba))});
   return rows;
 }
@@ -121,77 +156,105 @@ Rows above_the_screen() {
 Rows opacities() {
   Rows rows;
   const Camera camera = front_camera();
-  rows.push_back({"opacity 0", "pixels drawn", Bound::kAtMost, 0,
-                  double(drawn_pixels(draw(make_cloud({.opacity_low = 0, .opacity_high = 0}), camera)))});
-  rows.push_back({"opacity just below the cut", "pixels drawn", Bound::kAtMost, 0,
-                  double(drawn_pixels(draw(make_cloud({.opacity_low = 0.0039215, .opacity_high = 0.0039215}), camera)))});
-  add_agreement(rows, "opacity 1", make_cloud({.opacity_low = 1, .opacity_high = 1}), camera, 100, kStopFlip);
-  const Picture opaque =
-      draw(make_cloud({.count = 200, .half_size_m = 0.1f, .scale_m = {1, 1, 1}, .opacity_low = 1, .opacity_high = 1}), camera);
+  rows.push_back(
+      {"opacity 0", "pixels drawn", Bound::kAtMost, 0,
+       double(drawn_pixels(draw(make_cloud({.opacity_low = 0, .opacity_high = 0}), camera)))});
+  rows.push_back(
+      {"opacity just below the cut", "pixels drawn", Bound::kAtMost, 0,
+       double(drawn_pixels(
+           draw(make_cloud({.opacity_low = 0.0039215, .opacity_high = 0.0039215}), camera)))});
+  add_agreement(rows, "opacity 1", make_cloud({.opacity_low = 1, .opacity_high = 1}), camera, 100,
+                kStopFlip);
+  const Picture opaque = draw(make_cloud({.count = 200,
+                                          .half_size_m = 0.1f,
+                                          .scale_m = {1, 1, 1},
+                                          .opacity_low = 1,
+                                          .opacity_high = 1}),
+                              camera);
   double most = 0;
   for (size_t i = 3; i < opaque.rgba.size(); i += 4) most = std::max(most, double(opaque.rgba[i]));
-  rows.push_back({"200 layers of opacity 1", "largest alpha", Bound::kAtMost, 1 - double(kTransmittanceStop), most});
-  add_agreement(
-      rows, "opacity at the cut itself",
-      make_cloud({.count = 2000, .half_size_m = 0.05f, .scale_m = {0.5f, 0.5f, 0.5f}, .opacity_low = 0.00393, .opacity_high = 0.006}),
-      camera, 90, 2 * kCutFlip);
+  rows.push_back({"200 layers of opacity 1", "largest alpha", Bound::kAtMost,
+                  1 - double(kTransmittanceStop), most});
+  add_agreement(rows, "opacity at the cut itself",
+                make_cloud({.count = 2000,
+                            .half_size_m = 0.05f,
+                            .scale_m = {0.5f, 0.5f, 0.5f},
+                            .opacity_low = 0.00393,
+                            .opacity_high = 0.006}),
+                camera, 90, 2 * kCutFlip);
   return rows;
 }
 
 Rows many_layers() {
-  // alpha 0.01 in the middle; T = 0.99^n passes 1e-4 after 917 layers, and the rest must change nothing.
+  // alpha 0.01 in the middle; T = 0.99^n passes 1e-4 after 917 layers, and the rest must change
+  // nothing.
   GaussianSet layers;
   Random random(3);
   for (int i = 0; i < 100000; ++i) {
     const float shade = static_cast<float>(random.uniform(0, 1));
-    layers.add({0, 0, static_cast<float>(random.uniform(-0.5, 0.5))}, factor_of({1, 0, 0, 0}, {0.3f, 0.3f, 0.001f}), 0.01f,
-               {shade, 1 - shade, 0.5f});
+    layers.add({0, 0, static_cast<float>(random.uniform(-0.5, 0.5))},
+               factor_of({1, 0, 0, 0}, {0.3f, 0.3f, 0.001f}), 0.01f, {shade, 1 - shade, 0.5f});
   }
   Rows rows;
   add_agreement(rows, "100,000 layers of opacity 0.01", layers, front_camera(64), 105, 1e-4);
   GaussianSet faint;
   for (int i = 0; i < 100000; ++i) {
-    faint.add({0, 0, static_cast<float>(random.uniform(-0.5, 0.5))}, factor_of({1, 0, 0, 0}, {3, 3, 0.001f}), 1.01f / 255,
-              {1, 0.5f, 0.25f});
+    faint.add({0, 0, static_cast<float>(random.uniform(-0.5, 0.5))},
+              factor_of({1, 0, 0, 0}, {3, 3, 0.001f}), 1.01f / 255, {1, 0.5f, 0.25f});
   }
   const Picture picture = draw(faint, front_camera(64));
   // Straight colour of equal layers is their colour, however many there are.
   const float* middle = &picture.rgba[4 * (32 * 64 + 32)];
-  rows.push_back({"100,000 layers of opacity 1.01/255, all of one colour", "error of the straight colour", Bound::kAtMost, 2e-5,
-                  std::max({std::abs(middle[0] - 1.0), std::abs(middle[1] - 0.5), std::abs(middle[2] - 0.25)})});
-  rows.push_back({"100,000 layers of opacity 1.01/255, all of one colour", "transmittance left", Bound::kAtMost, 1.01e-4, 1.0 - middle[3]});
+  rows.push_back({"100,000 layers of opacity 1.01/255, all of one colour",
+                  "error of the straight colour", Bound::kAtMost, 2e-5,
+                  std::max({std::abs(middle[0] - 1.0), std::abs(middle[1] - 0.5),
+                            std::abs(middle[2] - 0.25)})});
+  rows.push_back({"100,000 layers of opacity 1.01/255, all of one colour", "transmittance left",
+                  Bound::kAtMost, 1.01e-4, 1.0 - middle[3]});
   return rows;
 }
 
-// The scene and its camera moved together: what is left is the rounding of positions and of the translation.
+// The scene and its camera moved together: what is left is the rounding of positions and of the
+// translation.
 Rows far_from_the_origin() {
   Rows rows;
-  for (const auto& [distance, limit] : {std::pair<float, double>{100, 80}, {1000, 62}, {10000, 42}}) {
+  for (const auto& [distance, limit] :
+       {std::pair<float, double>{100, 80}, {1000, 62}, {10000, 42}}) {
     GaussianSet set = make_cloud({.centre_m = {distance, 0, -distance}});
-    // Turned, so that the products of the view transform round: an axis-aligned camera would subtract exactly.
-    const Result<Camera> camera =
-        make_orbit_camera({.azimuth_deg = 30, .elevation_deg = 20, .target_m = {distance, 0, -distance}}, 256, 256);
-    const std::string name = "the scene " + std::to_string(int(distance)) + " m from the origin along x and z";
+    // Turned, so that the products of the view transform round: an axis-aligned camera would
+    // subtract exactly.
+    const Result<Camera> camera = make_orbit_camera(
+        {.azimuth_deg = 30, .elevation_deg = 20, .target_m = {distance, 0, -distance}}, 256, 256);
+    const std::string name =
+        "the scene " + std::to_string(int(distance)) + " m from the origin along x and z";
     const Agreement agreement = compare_with_oracle(set, *camera);
-    rows.push_back({name, "foreground psnr_db against the float64 oracle", Bound::kAtLeast, limit, agreement.psnr_db});
-    rows.push_back({name, "values that are not finite", Bound::kAtMost, 0, double(agreement.not_finite)});
+    rows.push_back({name, "foreground psnr_db against the float64 oracle", Bound::kAtLeast, limit,
+                    agreement.psnr_db});
+    rows.push_back(
+        {name, "values that are not finite", Bound::kAtMost, 0, double(agreement.not_finite)});
   }
   return rows;
 }
 
 Rows fields_of_view() {
   Rows rows;
-  add_agreement(rows, "field of view of 1 degree", make_cloud({.half_size_m = 0.02f, .scale_m = {0.0005f, 0.0005f, 0.0002f}}),
+  add_agreement(rows, "field of view of 1 degree",
+                make_cloud({.half_size_m = 0.02f, .scale_m = {0.0005f, 0.0005f, 0.0002f}}),
                 front_camera(256, 3, 1), 85, kCutFlip);
-  add_agreement(rows, "field of view of 170 degrees", make_cloud({.count = 4000, .half_size_m = 2.5f, .scale_m = {0.2f, 0.2f, 0.05f}}),
+  add_agreement(rows, "field of view of 170 degrees",
+                make_cloud({.count = 4000, .half_size_m = 2.5f, .scale_m = {0.2f, 0.2f, 0.05f}}),
                 front_camera(256, 3, 170), 105, kStopFlip);
-  // Far outside on one side the Jacobian's tangents are clamped; a large Gaussian there still reaches into the picture.
-  add_agreement(rows, "large Gaussians far outside the frustum", make_cloud({.count = 400, .centre_m = {4, 1, 0}, .scale_m = {2, 1, 0.5f}}),
+  // Far outside on one side the Jacobian's tangents are clamped; a large Gaussian there still
+  // reaches into the picture.
+  add_agreement(rows, "large Gaussians far outside the frustum",
+                make_cloud({.count = 400, .centre_m = {4, 1, 0}, .scale_m = {2, 1, 0.5f}}),
                 front_camera(), 90, kStopFlip);
   Camera aside = front_camera();
-  aside.cx_px = 700;  // the principal point far outside the image, as a crop of a large picture has it
+  aside.cx_px =
+      700;  // the principal point far outside the image, as a crop of a large picture has it
   aside.cy_px = -300;
-  add_agreement(rows, "principal point outside the image", make_cloud({.centre_m = {-4.88f, -3.65f, 0}}), aside, 100, kCutFlip);
+  add_agreement(rows, "principal point outside the image",
+                make_cloud({.centre_m = {-4.88f, -3.65f, 0}}), aside, 100, kCutFlip);
   return rows;
 }
 
@@ -199,16 +262,19 @@ Rows denormals() {
   Rows rows;
   const Camera camera = front_camera();
   GaussianSet set = make_cloud({});
-  for (size_t i = 0; i < set.covariance_factor.size(); i += 2) set.covariance_factor[i] = i % 4 == 0 ? kDenormal : -100 * kDenormal;
+  for (size_t i = 0; i < set.covariance_factor.size(); i += 2)
+    set.covariance_factor[i] = i % 4 == 0 ? kDenormal : -100 * kDenormal;
   for (size_t i = 0; i < set.position_m.size(); i += 5) set.position_m[i] = 3 * kDenormal;
   add_agreement(rows, "denormal positions and factors", set, camera, 105, kStopFlip);
   GaussianSet dark = make_cloud({});
   for (float& value : dark.sh) value = -kShOffset / kSh0 + 1e-7f;  // colours next to nothing
   const Picture picture = draw(dark, camera);
-  rows.push_back({"colours of 1e-8", "values that are not finite", Bound::kAtMost, 0, double(count_not_finite(picture.rgba))});
+  rows.push_back({"colours of 1e-8", "values that are not finite", Bound::kAtMost, 0,
+                  double(count_not_finite(picture.rgba))});
   rows.push_back({"colours of 1e-8", "largest colour", Bound::kAtMost, 1e-7, [&] {
                     double most = 0;
-                    for (size_t i = 0; i < picture.rgba.size(); ++i) most = i % 4 == 3 ? most : std::max(most, double(picture.rgba[i]));
+                    for (size_t i = 0; i < picture.rgba.size(); ++i)
+                      most = i % 4 == 3 ? most : std::max(most, double(picture.rgba[i]));
                     return most;
                   }()});
   return rows;
@@ -244,38 +310,45 @@ Rows not_a_number() {
     }
     GaussianSet one;
     one.position_m.assign(&sound.position_m[3 * i], &sound.position_m[3 * i] + 3);
-    one.covariance_factor.assign(&sound.covariance_factor[9 * i], &sound.covariance_factor[9 * i] + 9);
+    one.covariance_factor.assign(&sound.covariance_factor[9 * i],
+                                 &sound.covariance_factor[9 * i] + 9);
     one.opacity = {sound.opacity[i]};
     one.sh.assign(&sound.sh[3 * i], &sound.sh[3 * i] + 3);
     mixed.append(one);
   }
   const Picture picture = draw(mixed, camera);
-  return {{"6,000 Gaussians with NaN or infinity among 2,000 sound ones", "values that differ from the picture of the sound ones",
-           Bound::kAtMost, 0, double(count_different(expected.rgba, picture.rgba))},
-          {"6,000 Gaussians with NaN or infinity among 2,000 sound ones", "share of Gaussians left after culling", Bound::kAtMost, 0.25,
-           visible_share(picture)}};
+  return {{"6,000 Gaussians with NaN or infinity among 2,000 sound ones",
+           "values that differ from the picture of the sound ones", Bound::kAtMost, 0,
+           double(count_different(expected.rgba, picture.rgba))},
+          {"6,000 Gaussians with NaN or infinity among 2,000 sound ones",
+           "share of Gaussians left after culling", Bound::kAtMost, 0.25, visible_share(picture)}};
 }
 
 Rows order() {
   Rows rows;
   const Camera camera = front_camera();
   GaussianSet flat = make_cloud({});
-  for (size_t i = 2; i < flat.position_m.size(); i += 3) flat.position_m[i] = 0;  // one depth for all: the index decides
+  for (size_t i = 2; i < flat.position_m.size(); i += 3)
+    flat.position_m[i] = 0;  // one depth for all: the index decides
   add_agreement(rows, "2,000 Gaussians of equal depth", flat, camera, 105, kStopFlip);
   const GaussianView view = flat.view();
   const Picture one = draw({&view, 1}, camera, 1);
   size_t different = 0;
-  for (uint32_t threads : {2u, 3u, 8u}) different += count_different(one.rgba, draw({&view, 1}, camera, threads).rgba);
-  rows.push_back({"the same frame with 1, 2, 3 and 8 threads", "values that differ", Bound::kAtMost, 0, double(different)});
+  for (uint32_t threads : {2u, 3u, 8u})
+    different += count_different(one.rgba, draw({&view, 1}, camera, threads).rgba);
+  rows.push_back({"the same frame with 1, 2, 3 and 8 threads", "values that differ", Bound::kAtMost,
+                  0, double(different)});
   // Depths from 0.3 m to 3,000 km: integer or normalised depths would lose the near ones.
   GaussianSet deep;
   Random random(5);
   for (int i = 0; i < 3000; ++i) {
     const float depth = static_cast<float>(std::pow(10.0, random.uniform(-0.5, 6.5)));
     const float aside = 0.3f * depth;
-    deep.add({static_cast<float>(random.uniform(-aside, aside)), static_cast<float>(random.uniform(-aside, aside)), 3 - depth},
-             factor_of(random.quaternion(), {0.02f * depth, 0.02f * depth, 0.01f * depth}), 0.6f,
-             {static_cast<float>(random.uniform(0, 1)), static_cast<float>(random.uniform(0, 1)), 0.5f});
+    deep.add(
+        {static_cast<float>(random.uniform(-aside, aside)),
+         static_cast<float>(random.uniform(-aside, aside)), 3 - depth},
+        factor_of(random.quaternion(), {0.02f * depth, 0.02f * depth, 0.01f * depth}), 0.6f,
+        {static_cast<float>(random.uniform(0, 1)), static_cast<float>(random.uniform(0, 1)), 0.5f});
   }
   add_agreement(rows, "depths from 0.3 m to 3,000 km", deep, camera, 105, kStopFlip);
   return rows;

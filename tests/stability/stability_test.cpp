@@ -26,12 +26,22 @@ TEST_P(Stability, HoldsItsBounds) {
 
 std::string name_of(const testing::TestParamInfo<Case>& info) { return info.param.name; }
 
-INSTANTIATE_TEST_SUITE_P(Splatter, Stability, testing::ValuesIn(splat_cases().begin(), splat_cases().end()), name_of);
-INSTANTIATE_TEST_SUITE_P(Pose, Stability, testing::ValuesIn(pose_cases().begin(), pose_cases().end()), name_of);
-INSTANTIATE_TEST_SUITE_P(FixedPoint, Stability, testing::ValuesIn(fixed_point_cases().begin(), fixed_point_cases().end()), name_of);
-INSTANTIATE_TEST_SUITE_P(Sampling, Stability, testing::ValuesIn(sampling_cases().begin(), sampling_cases().end()), name_of);
-INSTANTIATE_TEST_SUITE_P(Sampler, Stability, testing::ValuesIn(sampler_cases().begin(), sampler_cases().end()), name_of);
-INSTANTIATE_TEST_SUITE_P(Package, Stability, testing::ValuesIn(package_cases().begin(), package_cases().end()), name_of);
+INSTANTIATE_TEST_SUITE_P(Splatter, Stability,
+                         testing::ValuesIn(splat_cases().begin(), splat_cases().end()), name_of);
+INSTANTIATE_TEST_SUITE_P(Pose, Stability,
+                         testing::ValuesIn(pose_cases().begin(), pose_cases().end()), name_of);
+INSTANTIATE_TEST_SUITE_P(FixedPoint, Stability,
+                         testing::ValuesIn(fixed_point_cases().begin(), fixed_point_cases().end()),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Sampling, Stability,
+                         testing::ValuesIn(sampling_cases().begin(), sampling_cases().end()),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Sampler, Stability,
+                         testing::ValuesIn(sampler_cases().begin(), sampler_cases().end()),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Package, Stability,
+                         testing::ValuesIn(package_cases().begin(), package_cases().end()),
+                         name_of);
 
 }  // namespace
 }  // namespace figurine::stability

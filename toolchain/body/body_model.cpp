@@ -8,7 +8,8 @@ namespace figurine::body {
 namespace {
 
 template <class Out>
-void add_shape(std::span<const float> basis, std::span<const float> shape, uint32_t count, Out& values) {
+void add_shape(std::span<const float> basis, std::span<const float> shape, uint32_t count,
+               Out& values) {
   for (uint32_t s = 0; s < count && s < shape.size(); ++s) {
     const float* direction = basis.data() + size_t{s} * values.size();
     for (size_t i = 0; i < values.size(); ++i) values[i] += shape[s] * direction[i];
@@ -33,9 +34,12 @@ std::vector<float> project_shape(const BodyModel& model, std::span<const float> 
   const size_t values = model.surface.position_m.size();
   FIG_CHECK(vertices_m.size() == values, "project_shape needs the surface's own vertices");
   using RowMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const Eigen::Map<const RowMatrix> basis(model.vertex_shape_basis_m.data(), model.shape_count, static_cast<Eigen::Index>(values));
-  const Eigen::Map<const Eigen::VectorXf> target(vertices_m.data(), static_cast<Eigen::Index>(values));
-  const Eigen::Map<const Eigen::VectorXf> mean(model.surface.position_m.data(), static_cast<Eigen::Index>(values));
+  const Eigen::Map<const RowMatrix> basis(model.vertex_shape_basis_m.data(), model.shape_count,
+                                          static_cast<Eigen::Index>(values));
+  const Eigen::Map<const Eigen::VectorXf> target(vertices_m.data(),
+                                                 static_cast<Eigen::Index>(values));
+  const Eigen::Map<const Eigen::VectorXf> mean(model.surface.position_m.data(),
+                                               static_cast<Eigen::Index>(values));
   // Normal equations in double: S is small and the directions are far from parallel.
   const Eigen::MatrixXd b = basis.cast<double>();
   const Eigen::VectorXd x = (b * b.transpose()).ldlt().solve(b * (target - mean).cast<double>());

@@ -21,7 +21,9 @@ class Scanner {
  public:
   Scanner(std::string_view text, const std::string& where) : text_(text), where_(where) {}
 
-  [[noreturn]] void fail(const std::string& reason) const { throw InputError(where_ + ": line " + std::to_string(line_) + ": " + reason); }
+  [[noreturn]] void fail(const std::string& reason) const {
+    throw InputError(where_ + ": line " + std::to_string(line_) + ": " + reason);
+  }
 
   std::string_view word() {
     while (at_ < text_.size() && is_space(text_[at_])) line_ += text_[at_++] == '\n';
@@ -36,14 +38,16 @@ class Scanner {
   }
   void expect(std::string_view wanted) {
     const std::string_view got = word();
-    if (got != wanted) fail("\"" + excerpt(got) + "\" where " + std::string(wanted) + " was expected");
+    if (got != wanted)
+      fail("\"" + excerpt(got) + "\" where " + std::string(wanted) + " was expected");
   }
   double number() {
     const std::string_view text = word();
     double value = 0;
     const char* first = text.data() + (text.front() == '+' ? 1 : 0);
     const auto [end, error] = std::from_chars(first, text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) fail("\"" + excerpt(text) + "\" is no number");
+    if (error != std::errc() || end != text.data() + text.size())
+      fail("\"" + excerpt(text) + "\" is no number");
     if (!(std::abs(value) <= kMaxMagnitude)) fail("\"" + excerpt(text) + "\" is out of range");
     return value;
   }
@@ -51,7 +55,8 @@ class Scanner {
     const std::string_view text = word();
     uint64_t value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) fail("\"" + excerpt(text) + "\" is no count");
+    if (error != std::errc() || end != text.data() + text.size())
+      fail("\"" + excerpt(text) + "\" is no count");
     return value;
   }
   static std::string excerpt(std::string_view text) { return std::string(text.substr(0, 40)); }
@@ -65,7 +70,8 @@ class Scanner {
 };
 
 std::optional<BvhChannel> channel_of(std::string_view name) {
-  constexpr std::array<std::string_view, 6> kNames = {"Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation"};
+  constexpr std::array<std::string_view, 6> kNames = {"Xposition", "Yposition", "Zposition",
+                                                      "Xrotation", "Yrotation", "Zrotation"};
   for (size_t i = 0; i < kNames.size(); ++i) {
     if (name == kNames[i]) return static_cast<BvhChannel>(i);
   }
@@ -143,10 +149,12 @@ void parse_motion(Scanner& in, Bvh& bvh) {
   in.expect("Frame");
   in.expect("Time:");
   bvh.frame_time_s = in.number();
-  if (!(bvh.frame_time_s >= 1e-3 && bvh.frame_time_s <= 1)) in.fail("frame time: not within 1 ms and 1 s");
+  if (!(bvh.frame_time_s >= 1e-3 && bvh.frame_time_s <= 1))
+    in.fail("frame time: not within 1 ms and 1 s");
   bvh.frame_count = static_cast<uint32_t>(frames);
   // Grown as values arrive: the count in the file allocates nothing by itself.
-  for (uint64_t i = 0; i < frames * bvh.channel_count; ++i) bvh.values.push_back(static_cast<float>(in.number()));
+  for (uint64_t i = 0; i < frames * bvh.channel_count; ++i)
+    bvh.values.push_back(static_cast<float>(in.number()));
   if (!in.done()) in.fail("more values than " + std::to_string(frames) + " frames hold");
 }
 

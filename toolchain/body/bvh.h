@@ -1,6 +1,8 @@
-// Reads BVH motion capture files: a joint hierarchy with Euler channels, and frames of channel values. For untrusted input.
+// Reads BVH motion capture files: a joint hierarchy with Euler channels, and frames of channel
+// values. For untrusted input.
 //
-// Based on: the Biovision hierarchy as written down by Meredith and Maddock, Motion Capture File Formats Explained, 2001.
+// Based on: the Biovision hierarchy as written down by Meredith and Maddock, Motion Capture File
+// Formats Explained, 2001.
 #pragma once
 
 #include <array>
@@ -11,7 +13,14 @@
 
 namespace figurine::body {
 
-enum class BvhChannel : uint8_t { kXPosition, kYPosition, kZPosition, kXRotation, kYRotation, kZRotation };
+enum class BvhChannel : uint8_t {
+  kXPosition,
+  kYPosition,
+  kZPosition,
+  kXRotation,
+  kYRotation,
+  kZRotation
+};
 
 struct BvhJoint {
   std::string name;
@@ -34,7 +43,8 @@ struct Bvh {
   int find(const std::string& joint_name) const;  // -1 if there is none
 };
 
-// Limits: 1024 joints, 64 deep, 2^26 values, magnitudes to 1e6, frame time from 1 ms to 1 s. InputError naming `where`, line and reason.
+// Limits: 1024 joints, 64 deep, 2^26 values, magnitudes to 1e6, frame time from 1 ms to 1 s.
+// InputError naming `where`, line and reason.
 Bvh parse_bvh(std::string_view text, const std::string& where);
 Bvh read_bvh(const std::string& path);
 

@@ -18,7 +18,8 @@ constexpr const char* kEmotes = "@dcl/wearable-preview";
 
 // The sentence that the database's authors ask for.
 constexpr const char* kCmuSource =
-    "BVH conversion by B. Hahne, free for research and commercial use. The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "BVH conversion by B. Hahne, free for research and commercial use. The data used in this "
+    "project was obtained from mocap.cs.cmu.edu. "
     "The database was created with funding from NSF EIA-0196217.";
 
 std::string glb_source(const fs::path& path) {
@@ -26,19 +27,23 @@ std::string glb_source(const fs::path& path) {
   std::ifstream file(folder.parent_path() / "package.json");
   const nlohmann::json package = nlohmann::json::parse(file, nullptr, false);
   const auto text = [&](const char* key) {
-    return package.is_object() && package.contains(key) && package[key].is_string() ? package[key].get<std::string>() : std::string();
+    return package.is_object() && package.contains(key) && package[key].is_string()
+               ? package[key].get<std::string>()
+               : std::string();
   };
   const std::string name = text("name"), version = text("version"), licence = text("license");
-  if (name != kEmotes || version.empty() || licence.empty()) return clip.filename().string() + ": supplied by the user";
-  return clip.filename().string() + ": " + (folder.filename() / clip.filename()).string() + " of the npm package " + name + " " + version +
-         ", " + licence;
+  if (name != kEmotes || version.empty() || licence.empty())
+    return clip.filename().string() + ": supplied by the user";
+  return clip.filename().string() + ": " + (folder.filename() / clip.filename()).string() +
+         " of the npm package " + name + " " + version + ", " + licence;
 }
 
 std::string package_source(const std::string& path) {
   const ports::MappedFile file = value_or_throw(ports::MappedFile::open(path), path);
   const Package package = value_or_throw(Package::open(file.bytes(), path), path);
   std::string source;
-  for (const std::string& line : package.provenance().sources) source += (source.empty() ? "" : "; ") + line;
+  for (const std::string& line : package.provenance().sources)
+    source += (source.empty() ? "" : "; ") + line;
   return source;
 }
 
@@ -52,13 +57,15 @@ std::string clip_source(const std::string& path) {
   return file.filename().string() + ": supplied by the user";
 }
 
-MotionClip read_clip(const std::string& path, const figurine::Body& body, const RetargetOptions& options, RetargetReport* report) {
+MotionClip read_clip(const std::string& path, const figurine::Body& body,
+                     const RetargetOptions& options, RetargetReport* report) {
   const std::string extension = fs::path(path).extension().string();
   if (extension == ".bvh") return retarget_bvh(read_bvh(path), body, options, report);
   if (extension == ".npz") return retarget_npz(path, body, options, report);
   if (extension == ".glb") return retarget_glb(path, body, options, report);
   if (extension == ".fgn") return read_motion_clip(path);
-  throw InputError(path + ": unsupported: a motion is a .bvh, .npz or .glb clip, or a motion package .fgn");
+  throw InputError(
+      path + ": unsupported: a motion is a .bvh, .npz or .glb clip, or a motion package .fgn");
 }
 
 }  // namespace figurine::body

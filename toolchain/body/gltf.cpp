@@ -38,7 +38,8 @@ std::string excerpt(const std::string& text) {
 // A value of the JSON and how to name it: "animations[0].samplers[3].input".
 class Field {
  public:
-  Field(const nlohmann::json& value, std::string path, const std::string& where) : value_(&value), path_(std::move(path)), where_(&where) {}
+  Field(const nlohmann::json& value, std::string path, const std::string& where)
+      : value_(&value), path_(std::move(path)), where_(&where) {}
 
   [[noreturn]] void fail(const std::string& reason) const {
     throw InputError(*where_ + ": " + (path_.empty() ? "JSON" : path_) + ": " + reason);
@@ -59,14 +60,18 @@ class Field {
   // An element of a top-level array, by the index that this field holds.
   Field of(const Field& array) const {
     const uint64_t index = count();
-    if (index >= array.size()) fail(std::to_string(index) + ": there are only " + std::to_string(array.size()) + " " + array.path_);
+    if (index >= array.size())
+      fail(std::to_string(index) + ": there are only " + std::to_string(array.size()) + " " +
+           array.path_);
     return array[static_cast<size_t>(index)];
   }
   uint64_t count() const {
     if (!value_->is_number_unsigned()) fail("not a count");
     return value_->get<uint64_t>();
   }
-  uint64_t count_or(const char* key, uint64_t otherwise) const { return has(key) ? (*this)[key].count() : otherwise; }
+  uint64_t count_or(const char* key, uint64_t otherwise) const {
+    return has(key) ? (*this)[key].count() : otherwise;
+  }
   double number() const {
     if (!value_->is_number()) fail("not a number");
     const double number = value_->get<double>();
@@ -96,7 +101,9 @@ class Field {
     if (!value_->is_object()) fail("not an object");
     return *value_;
   }
-  Field named(const char* key) const { return {*value_, path_.empty() ? key : path_ + "." + key, *where_}; }
+  Field named(const char* key) const {
+    return {*value_, path_.empty() ? key : path_ + "." + key, *where_};
+  }
 
   const nlohmann::json* value_;
   std::string path_;
@@ -108,7 +115,8 @@ struct Chunks {
   bool has_bin = false;
 };
 
-uint32_t word_at(std::span<const std::byte> bytes, size_t offset) {  // hosts of the toolchain are little-endian, as the file is
+uint32_t word_at(std::span<const std::byte> bytes,
+                 size_t offset) {  // hosts of the toolchain are little-endian, as the file is
   uint32_t word = 0;
   std::memcpy(&word, bytes.data() + offset, sizeof word);
   return word;
@@ -118,9 +126,11 @@ Chunks chunks_of(std::span<const std::byte> bytes, const std::string& where) {
   const auto fail = [&](const std::string& reason) { throw InputError(where + ": " + reason); };
   if (bytes.size() < 12) fail("header: the file ends early");
   if (word_at(bytes, 0) != kMagic) fail("header: magic: not a binary glTF file");
-  if (word_at(bytes, 4) != 2) fail("header: version " + std::to_string(word_at(bytes, 4)) + ": only 2 is read");
+  if (word_at(bytes, 4) != 2)
+    fail("header: version " + std::to_string(word_at(bytes, 4)) + ": only 2 is read");
   if (word_at(bytes, 8) != bytes.size()) {
-    fail("header: length: " + std::to_string(word_at(bytes, 8)) + " bytes, the file has " + std::to_string(bytes.size()));
+    fail("header: length: " + std::to_string(word_at(bytes, 8)) + " bytes, the file has " +
+         std::to_string(bytes.size()));
   }
   Chunks chunks;
   size_t at = 12;
@@ -130,10 +140,12 @@ Chunks chunks_of(std::span<const std::byte> bytes, const std::string& where) {
     const uint32_t length = word_at(bytes, at), type = word_at(bytes, at + 4);
     at += 8;
     if (length > bytes.size() - at) {
-      fail(name + ": length: " + std::to_string(length) + " bytes, " + std::to_string(bytes.size() - at) + " are left in the file");
+      fail(name + ": length: " + std::to_string(length) + " bytes, " +
+           std::to_string(bytes.size() - at) + " are left in the file");
     }
     if (length % 4 != 0) fail(name + ": length: not a multiple of 4");
-    if ((index == 0) != (type == kJsonChunk)) fail(name + ": type: the JSON chunk comes first and once");
+    if ((index == 0) != (type == kJsonChunk))
+      fail(name + ": type: the JSON chunk comes first and once");
     const auto body = bytes.subspan(at, length);
     if (index == 0) chunks.json = body;
     if (index == 1 && type == kBinChunk) {
@@ -146,10 +158,12 @@ Chunks chunks_of(std::span<const std::byte> bytes, const std::string& where) {
   return chunks;
 }
 
-// A matrix that is a translation, a rotation and a scale. Skinned skeletons hold no shear, and a mirror has no quaternion.
+// A matrix that is a translation, a rotation and a scale. Skinned skeletons hold no shear, and a
+// mirror has no quaternion.
 GltfTransform decomposed(const Field& field) {
   const std::array<double, 16> m = field.numbers<16>();  // column-major
-  if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) field.fail("the last row is not 0, 0, 0, 1");
+  if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
+    field.fail("the last row is not 0, 0, 0, 1");
   Eigen::Matrix3d linear;
   linear << m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10];
   GltfTransform out;
@@ -157,7 +171,8 @@ GltfTransform decomposed(const Field& field) {
   out.scale = linear.colwise().norm().transpose();
   if (!(out.scale.minCoeff() > 1e-9)) field.fail("an axis of no length");
   linear = linear * out.scale.cwiseInverse().asDiagonal();
-  if ((linear.transpose() * linear - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3) field.fail("sheared");
+  if ((linear.transpose() * linear - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3)
+    field.fail("sheared");
   if (linear.determinant() < 0) field.fail("mirrored");
   out.rotation = Quat(linear).normalized();
   return out;
@@ -193,7 +208,8 @@ void parse_nodes(const Field& root, Gltf& gltf) {
       const Field child = node["children"][c];
       child.of(nodes);  // within range
       GltfNode& other = gltf.nodes[static_cast<size_t>(child.count())];
-      if (other.parent >= 0) child.fail("node " + std::to_string(child.count()) + " has two parents");
+      if (other.parent >= 0)
+        child.fail("node " + std::to_string(child.count()) + " has two parents");
       other.parent = static_cast<int>(i);
       children[i].push_back(static_cast<uint32_t>(child.count()));
     }
@@ -218,7 +234,8 @@ float stored(const std::byte* at) {
   T value;
   std::memcpy(&value, at, sizeof value);
   if constexpr (std::is_floating_point_v<T>) return value;
-  return std::max(static_cast<float>(value) / static_cast<float>(std::numeric_limits<T>::max()), -1.0f);
+  return std::max(static_cast<float>(value) / static_cast<float>(std::numeric_limits<T>::max()),
+                  -1.0f);
 }
 constexpr std::array<Component, 5> kComponents = {{{5120, 1, stored<int8_t>},
                                                    {5121, 1, stored<uint8_t>},
@@ -244,32 +261,42 @@ class Accessors {
       accessor["type"].fail("\"" + accessor["type"].text() + "\", expected " + shape.type);
     }
     const uint64_t stored_type = accessor["componentType"].count();
-    const auto* component = std::find_if(kComponents.begin(), kComponents.end(), [&](const Component& c) { return c.type == stored_type; });
+    const auto* component = std::find_if(kComponents.begin(), kComponents.end(),
+                                         [&](const Component& c) { return c.type == stored_type; });
     if (component == kComponents.end() || (stored_type != kFloat && !shape.may_be_integer)) {
-      accessor["componentType"].fail(std::to_string(stored_type) + ": not one that these keys may have");
+      accessor["componentType"].fail(std::to_string(stored_type) +
+                                     ": not one that these keys may have");
     }
-    if (stored_type != kFloat && !accessor.flag_or_false("normalized")) accessor.fail("integers that are not normalized");
+    if (stored_type != kFloat && !accessor.flag_or_false("normalized"))
+      accessor.fail("integers that are not normalized");
     if (accessor.has("sparse")) accessor["sparse"].fail("unsupported: sparse keys are not read");
 
     const Field view = accessor["bufferView"].of(root_["bufferViews"]);
     const std::span<const std::byte> bytes = view_bytes(view);
     const size_t element = component->bytes * shape.width;
-    const uint64_t stride = view.count_or("byteStride", element), offset = accessor.count_or("byteOffset", 0);
+    const uint64_t stride = view.count_or("byteStride", element),
+                   offset = accessor.count_or("byteOffset", 0);
     const uint64_t count = accessor["count"].count();
-    if (stride < element || stride > 252) view["byteStride"].fail(std::to_string(stride) + ": not within the element's size and 252");
+    if (stride < element || stride > 252)
+      view["byteStride"].fail(std::to_string(stride) + ": not within the element's size and 252");
     if (count == 0) accessor["count"].fail("no elements");
-    if (offset > bytes.size() || bytes.size() - offset < element || (bytes.size() - offset - element) / stride < count - 1) {
-      accessor.fail("reaches past the end of its buffer view of " + std::to_string(bytes.size()) + " bytes");
+    if (offset > bytes.size() || bytes.size() - offset < element ||
+        (bytes.size() - offset - element) / stride < count - 1) {
+      accessor.fail("reaches past the end of its buffer view of " + std::to_string(bytes.size()) +
+                    " bytes");
     }
     // Counted over the whole animation: many samplers may name one accessor.
-    if (count > (kMaxValues - values_read_) / shape.width) accessor["count"].fail("more than 2^26 key values in the animation");
+    if (count > (kMaxValues - values_read_) / shape.width)
+      accessor["count"].fail("more than 2^26 key values in the animation");
     values_read_ += count * shape.width;
     std::vector<float> values;
     values.reserve(count * shape.width);
     for (uint64_t i = 0; i < count; ++i) {
       for (size_t k = 0; k < shape.width; ++k) {
-        const float value = component->value(bytes.data() + offset + i * stride + k * component->bytes);
-        if (!(std::abs(value) <= kMaxMagnitude)) accessor.fail("element " + std::to_string(i) + ": not finite or out of range");
+        const float value =
+            component->value(bytes.data() + offset + i * stride + k * component->bytes);
+        if (!(std::abs(value) <= kMaxMagnitude))
+          accessor.fail("element " + std::to_string(i) + ": not finite or out of range");
         values.push_back(value);
       }
     }
@@ -287,7 +314,8 @@ class Accessors {
     }
     const uint64_t buffer_bytes = buffer["byteLength"].count();
     if (buffer_bytes > chunks_.bin.size()) {
-      buffer["byteLength"].fail(std::to_string(buffer_bytes) + " bytes, the binary chunk has " + std::to_string(chunks_.bin.size()));
+      buffer["byteLength"].fail(std::to_string(buffer_bytes) + " bytes, the binary chunk has " +
+                                std::to_string(chunks_.bin.size()));
     }
     const uint64_t offset = view.count_or("byteOffset", 0), length = view["byteLength"].count();
     if (offset > buffer_bytes || length > buffer_bytes - offset) {
@@ -319,37 +347,48 @@ GltfTrack parse_track(const Field& sampler, GltfPath path, Accessors& accessors)
   const Field input = sampler["input"], output = sampler["output"];
   track.times_s = accessors.read(input, {"SCALAR", 1, false});
   for (size_t i = 0; i < track.times_s.size(); ++i) {
-    if (!(track.times_s[i] >= 0 && track.times_s[i] <= kMaxTimeS)) input.fail("key " + std::to_string(i) + ": not within 0 and 1e5 s");
-    if (i > 0 && !(track.times_s[i] > track.times_s[i - 1])) input.fail("key " + std::to_string(i) + ": not later than the one before");
+    if (!(track.times_s[i] >= 0 && track.times_s[i] <= kMaxTimeS))
+      input.fail("key " + std::to_string(i) + ": not within 0 and 1e5 s");
+    if (i > 0 && !(track.times_s[i] > track.times_s[i - 1]))
+      input.fail("key " + std::to_string(i) + ": not later than the one before");
   }
-  const size_t width = width_of(path), rows = track.interpolation == GltfInterpolation::kCubicSpline ? 3 : 1;
-  track.values = accessors.read(output, {width == 4 ? "VEC4" : "VEC3", width, path == GltfPath::kRotation});
+  const size_t width = width_of(path),
+               rows = track.interpolation == GltfInterpolation::kCubicSpline ? 3 : 1;
+  track.values =
+      accessors.read(output, {width == 4 ? "VEC4" : "VEC3", width, path == GltfPath::kRotation});
   if (track.values.size() != track.times_s.size() * rows * width) {
-    output.fail(std::to_string(track.values.size() / width) + " values for " + std::to_string(track.times_s.size()) + " keys");
+    output.fail(std::to_string(track.values.size() / width) + " values for " +
+                std::to_string(track.times_s.size()) + " keys");
   }
   for (size_t i = 0; i < track.times_s.size(); ++i) {
     const float* value = &track.values[(i * rows + rows / 2) * width];
-    if (path == GltfPath::kRotation && !(std::hypot(std::hypot(value[0], value[1]), std::hypot(value[2], value[3])) > 1e-3f)) {
+    if (path == GltfPath::kRotation &&
+        !(std::hypot(std::hypot(value[0], value[1]), std::hypot(value[2], value[3])) > 1e-3f)) {
       output.fail("key " + std::to_string(i) + ": a quaternion of no length");
     }
-    if (path == GltfPath::kScale && std::min({value[0], value[1], value[2]}) < 0) output.fail("key " + std::to_string(i) + ": mirrored");
+    if (path == GltfPath::kScale && std::min({value[0], value[1], value[2]}) < 0)
+      output.fail("key " + std::to_string(i) + ": mirrored");
   }
   return track;
 }
 
 void parse_animation(const Field& root, const Chunks& chunks, Gltf& gltf) {
-  if (!root.has("animations") || root["animations"].size() == 0) throw InputError(gltf.where + ": animations: there are none");
+  if (!root.has("animations") || root["animations"].size() == 0)
+    throw InputError(gltf.where + ": animations: there are none");
   const Field animations = root["animations"];
   if (gltf.animation >= animations.size()) {
-    animations.fail("no number " + std::to_string(gltf.animation) + ": there are " + std::to_string(animations.size()));
+    animations.fail("no number " + std::to_string(gltf.animation) + ": there are " +
+                    std::to_string(animations.size()));
   }
-  const Field animation = animations[gltf.animation], channels = animation["channels"], samplers = animation["samplers"];
+  const Field animation = animations[gltf.animation], channels = animation["channels"],
+              samplers = animation["samplers"];
   Accessors accessors(root, chunks);
   std::set<std::pair<uint64_t, GltfPath>> seen;
   for (size_t c = 0; c < channels.size(); ++c) {
     const Field target = channels[c]["target"];
     const std::string name = target["path"].text();
-    if (name == "weights" || name == "pointer" || !target.has("node")) continue;  // of meshes, or of an extension
+    if (name == "weights" || name == "pointer" || !target.has("node"))
+      continue;  // of meshes, or of an extension
     GltfPath path;
     if (name == "translation") {
       path = GltfPath::kTranslation;
@@ -361,8 +400,11 @@ void parse_animation(const Field& root, const Chunks& chunks, Gltf& gltf) {
       target["path"].fail("\"" + name + "\" is none of translation, rotation, scale and weights");
     }
     const Field node = target["node"].of(root["nodes"]);
-    if (node.has("matrix")) target["node"].fail("node " + std::to_string(target["node"].count()) + " has a matrix: it cannot be animated");
-    if (!seen.emplace(target["node"].count(), path).second) target.fail("a second channel for the same node and path");
+    if (node.has("matrix"))
+      target["node"].fail("node " + std::to_string(target["node"].count()) +
+                          " has a matrix: it cannot be animated");
+    if (!seen.emplace(target["node"].count(), path).second)
+      target.fail("a second channel for the same node and path");
     GltfTrack track = parse_track(channels[c]["sampler"].of(samplers), path, accessors);
     track.node = static_cast<uint32_t>(target["node"].count());
     gltf.tracks.push_back(std::move(track));
@@ -380,21 +422,25 @@ Eigen::Vector4d value_at(const GltfTrack& track, double time_s) {
   };
   const auto finished = [&](const Eigen::Vector4d& value) {
     if (width == 3) return value;
-    // A spline through opposite quaternions may pass through zero: nothing better than the key is known there.
+    // A spline through opposite quaternions may pass through zero: nothing better than the key is
+    // known there.
     return value.norm() > 1e-6 ? Eigen::Vector4d(value.normalized()) : Eigen::Vector4d(0, 0, 0, 1);
   };
   const auto next = std::upper_bound(track.times_s.begin(), track.times_s.end(), time_s);
   if (next == track.times_s.begin()) return finished(row(0, 1));
   const size_t a = static_cast<size_t>(next - track.times_s.begin()) - 1;
   if (a + 1 == keys || track.interpolation == GltfInterpolation::kStep) return finished(row(a, 1));
-  const double span_s = double{track.times_s[a + 1]} - double{track.times_s[a]}, t = (time_s - double{track.times_s[a]}) / span_s;
+  const double span_s = double{track.times_s[a + 1]} - double{track.times_s[a]},
+               t = (time_s - double{track.times_s[a]}) / span_s;
   if (cubic) {
     const double t2 = t * t, t3 = t2 * t;
-    return finished((2 * t3 - 3 * t2 + 1) * row(a, 1) + span_s * (t3 - 2 * t2 + t) * row(a, 2) + (-2 * t3 + 3 * t2) * row(a + 1, 1) +
-                    span_s * (t3 - t2) * row(a + 1, 0));
+    return finished((2 * t3 - 3 * t2 + 1) * row(a, 1) + span_s * (t3 - 2 * t2 + t) * row(a, 2) +
+                    (-2 * t3 + 3 * t2) * row(a + 1, 1) + span_s * (t3 - t2) * row(a + 1, 0));
   }
   if (width == 3) return (1 - t) * row(a, 1) + t * row(a + 1, 1);
-  return Quat(finished(row(a, 1))).slerp(t, Quat(finished(row(a + 1, 1)))).coeffs();  // along the shorter way
+  return Quat(finished(row(a, 1)))
+      .slerp(t, Quat(finished(row(a + 1, 1))))
+      .coeffs();  // along the shorter way
 }
 
 }  // namespace
@@ -429,7 +475,8 @@ Gltf parse_glb(std::span<const std::byte> bytes, const std::string& where, uint3
   gltf.animation = animation;
   const Field root(json, "", where);
   const Field asset = root["asset"];
-  if (!asset["version"].text().starts_with("2.")) asset["version"].fail("\"" + asset["version"].text() + "\": only 2.0 is read");
+  if (!asset["version"].text().starts_with("2."))
+    asset["version"].fail("\"" + asset["version"].text() + "\": only 2.0 is read");
   parse_nodes(root, gltf);
   parse_animation(root, chunks, gltf);
   return gltf;

@@ -1,9 +1,12 @@
-// Reads the animated skeletons of binary glTF 2.0 files (.glb): the tree of nodes and the keys of one animation. For untrusted input.
+// Reads the animated skeletons of binary glTF 2.0 files (.glb): the tree of nodes and the keys of
+// one animation. For untrusted input.
 //
-// Meshes, materials, images and skins are not looked at. Nothing but the file itself is opened: a buffer that names a URI is an error where
-// an animation needs it. Keys are kept as they are in the file and interpolated when asked for, as its author meant them.
+// Meshes, materials, images and skins are not looked at. Nothing but the file itself is opened: a
+// buffer that names a URI is an error where an animation needs it. Keys are kept as they are in the
+// file and interpolated when asked for, as its author meant them.
 //
-// Based on: Khronos Group, glTF 2.0 Specification, 2021, sections 3.6 (buffers), 3.11 and appendix C (animation), 4.4 (GLB).
+// Based on: Khronos Group, glTF 2.0 Specification, 2021, sections 3.6 (buffers), 3.11 and appendix
+// C (animation), 4.4 (GLB).
 #pragma once
 
 #include <Eigen/Geometry>
@@ -24,8 +27,9 @@ struct GltfTransform {
 };
 
 struct GltfNode {
-  std::string name;  // at most 64 characters, control characters replaced; empty where the file has none
-  int parent = -1;   // in file order, so it may come later
+  std::string
+      name;  // at most 64 characters, control characters replaced; empty where the file has none
+  int parent = -1;  // in file order, so it may come later
   GltfTransform rest;
 };
 
@@ -37,7 +41,8 @@ struct GltfTrack {
   GltfPath path = GltfPath::kTranslation;
   GltfInterpolation interpolation = GltfInterpolation::kLinear;
   std::vector<float> times_s;  // [K] strictly increasing
-  std::vector<float> values;   // [K,3] or [K,4] (xyzw); kCubicSpline: [K,3,3] or [K,3,4], tangent in, value, tangent out
+  std::vector<float> values;   // [K,3] or [K,4] (xyzw); kCubicSpline: [K,3,3] or [K,3,4], tangent
+                               // in, value, tangent out
 };
 
 struct Gltf {
@@ -47,11 +52,13 @@ struct Gltf {
   uint32_t animation = 0;
   std::vector<GltfTrack> tracks;  // of that animation; at most one a node and path
 
-  // Transforms to the parents at a time; before the first and after the last key of a track its end holds.
+  // Transforms to the parents at a time; before the first and after the last key of a track its end
+  // holds.
   std::vector<GltfTransform> at(double time_s) const;
 };
 
-// Limits: 4096 nodes, 2^26 key values, magnitudes to 1e6, times to 1e5 s. InputError naming `where`, field and reason.
+// Limits: 4096 nodes, 2^26 key values, magnitudes to 1e6, times to 1e5 s. InputError naming
+// `where`, field and reason.
 Gltf parse_glb(std::span<const std::byte> bytes, const std::string& where, uint32_t animation = 0);
 Gltf read_glb(const std::string& path, uint32_t animation = 0);
 

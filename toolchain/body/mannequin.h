@@ -1,8 +1,8 @@
-// A procedural body of the project's own: no data, the 55 joints of SMPL-X, smooth lofted parts, one rectangular UV chart each. The body of
-// the tests.
+// A procedural body of the project's own: no data, the 55 joints of SMPL-X, smooth lofted parts,
+// one rectangular UV chart each. The body of the tests.
 //
-// What it is not: anatomy. Parts are closed tubes that overlap where limbs meet the trunk, like an artist's wooden figure. Rest: arms 45
-// degrees down.
+// What it is not: anatomy. Parts are closed tubes that overlap where limbs meet the trunk, like an
+// artist's wooden figure. Rest: arms 45 degrees down.
 #pragma once
 
 #include "toolchain/body/body_model.h"
@@ -18,10 +18,12 @@ struct MannequinShape {
 };
 inline constexpr uint32_t kMannequinShapeCount = 4;
 
-// The mean template is MannequinShape{}; each direction is half the difference between +1 and -1. The same bytes on every call.
+// The mean template is MannequinShape{}; each direction is half the difference between +1 and -1.
+// The same bytes on every call.
 BodyModel make_mannequin();
 
-// A mannequin of any shape itself, not its linearisation: vertices in the order of make_mannequin().surface.
+// A mannequin of any shape itself, not its linearisation: vertices in the order of
+// make_mannequin().surface.
 std::vector<float> mannequin_vertices(const MannequinShape& shape);
 JointPositions mannequin_joints(const MannequinShape& shape);
 

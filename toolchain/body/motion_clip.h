@@ -1,4 +1,5 @@
-// A motion in memory: poses of the 55 joints at a fixed rate, owned. What the motion command writes and the capture tool plays.
+// A motion in memory: poses of the 55 joints at a fixed rate, owned. What the motion command writes
+// and the capture tool plays.
 #pragma once
 
 #include <array>
@@ -22,23 +23,25 @@ struct MotionClip {
   float frames_per_second = 30;
   uint32_t frame_count = 0;
   std::vector<float> root_translation_m;  // [F,3]
-  std::vector<float> rotations;           // [F,55,4] unit, wxyz, sign-continuous from frame to frame
+  std::vector<float> rotations;  // [F,55,4] unit, wxyz, sign-continuous from frame to frame
 
   figurine::Motion view() const;  // borrows
   OwnedPose pose(uint32_t frame) const;
 };
 
-// Reads a motion package and copies it out. InputError naming the file, also if its joints are not the 55 of SMPL-X.
+// Reads a motion package and copies it out. InputError naming the file, also if its joints are not
+// the 55 of SMPL-X.
 MotionClip read_motion_clip(const std::string& path);
 
-// The pose turned about the vertical line through the root joint by angle_rad (positive: from +z towards +x): the same pose under another
-// heading.
+// The pose turned about the vertical line through the root joint by angle_rad (positive: from +z
+// towards +x): the same pose under another heading.
 OwnedPose turned(OwnedPose pose, float angle_rad);
 
 // The rest pose: all rotations identity.
 OwnedPose rest_pose();
 
-// Makes quaternions [F,J,4] unit and sign-continuous. Quaternions shorter than 1e-6 become the identity.
+// Makes quaternions [F,J,4] unit and sign-continuous. Quaternions shorter than 1e-6 become the
+// identity.
 void make_continuous(std::vector<float>& rotations, uint32_t joints);
 
 }  // namespace figurine::body

@@ -15,7 +15,7 @@ using Quat = Eigen::Quaterniond;
 using Vec3 = Eigen::Vector3d;
 
 constexpr uint32_t kMatchedJoints = kJaw;  // body joints: fingers, jaw and eyes do not decide
-constexpr uint32_t kRateFrames = 2;        // rates are compared over this many frames to either side
+constexpr uint32_t kRateFrames = 2;  // rates are compared over this many frames to either side
 
 // A clip in a frame of reference that turns with the figure.
 struct Straight {
@@ -23,21 +23,28 @@ struct Straight {
   std::vector<Vec3> root;      // [F] path along +z
 };
 
-double heading_of(const Quat& q) { return std::atan2(2 * (q.x() * q.z() + q.w() * q.y()), 1 - 2 * (q.x() * q.x() + q.y() * q.y())); }
+double heading_of(const Quat& q) {
+  return std::atan2(2 * (q.x() * q.z() + q.w() * q.y()), 1 - 2 * (q.x() * q.x() + q.y() * q.y()));
+}
 
 Quat turn(double angle) { return Quat(Eigen::AngleAxisd(angle, Vec3::UnitY())); }
 
-// Headings without jumps of a full turn, averaged over about a gait cycle, so that what remains is the sway of the hips.
-std::vector<double> slow_heading(const std::vector<Quat>& rotation, uint32_t frames, double cycle_frames) {
+// Headings without jumps of a full turn, averaged over about a gait cycle, so that what remains is
+// the sway of the hips.
+std::vector<double> slow_heading(const std::vector<Quat>& rotation, uint32_t frames,
+                                 double cycle_frames) {
   std::vector<double> heading(frames);
   for (uint32_t f = 0; f < frames; ++f) {
     heading[f] = heading_of(rotation[size_t{f} * kJointCount]);
-    if (f > 0) heading[f] -= 2 * std::numbers::pi * std::round((heading[f] - heading[f - 1]) / (2 * std::numbers::pi));
+    if (f > 0)
+      heading[f] -=
+          2 * std::numbers::pi * std::round((heading[f] - heading[f - 1]) / (2 * std::numbers::pi));
   }
   const double sigma = 0.5 * cycle_frames;
   std::vector<double> slow(frames);
   for (uint32_t f = 0; f < frames; ++f) {
-    // A straight line fitted under the window does not bend towards the middle at the clip's ends, as a plain mean would.
+    // A straight line fitted under the window does not bend towards the middle at the clip's ends,
+    // as a plain mean would.
     double s0 = 0, s1 = 0, s2 = 0, h0 = 0, h1 = 0;
     for (uint32_t i = 0; i < frames; ++i) {
       const double x = double(i) - double(f), w = std::exp(-0.5 * x * x / (sigma * sigma));
@@ -55,7 +62,8 @@ std::vector<double> slow_heading(const std::vector<Quat>& rotation, uint32_t fra
 Straight straighten(const MotionClip& clip, double cycle_frames) {
   Straight out;
   for (size_t i = 0; i < clip.rotations.size(); i += 4) {
-    out.rotation.emplace_back(clip.rotations[i], clip.rotations[i + 1], clip.rotations[i + 2], clip.rotations[i + 3]);
+    out.rotation.emplace_back(clip.rotations[i], clip.rotations[i + 1], clip.rotations[i + 2],
+                              clip.rotations[i + 3]);
   }
   const std::vector<double> slow = slow_heading(out.rotation, clip.frame_count, cycle_frames);
   const auto place = [&](uint32_t f) {
@@ -66,8 +74,9 @@ Straight straighten(const MotionClip& clip, double cycle_frames) {
     Quat& root = out.rotation[size_t{f} * kJointCount];
     root = turn(-slow[f]) * root;
     // Steps are turned, not places: the path unrolls.
-    const Vec3 before =
-        f == 0 ? Vec3(0, place(0).y(), 0) : Vec3(out.root[f - 1] + turn(-0.5 * (slow[f] + slow[f - 1])) * (place(f) - place(f - 1)));
+    const Vec3 before = f == 0 ? Vec3(0, place(0).y(), 0)
+                               : Vec3(out.root[f - 1] + turn(-0.5 * (slow[f] + slow[f - 1])) *
+                                                            (place(f) - place(f - 1)));
     out.root.push_back(before);
   }
   return out;
@@ -76,7 +85,8 @@ Straight straighten(const MotionClip& clip, double cycle_frames) {
 double squared_distance(const Straight& s, uint32_t a, uint32_t b) {
   double sum = 0;
   for (uint32_t j = 0; j < kMatchedJoints; ++j) {
-    const double angle = s.rotation[size_t{a} * kJointCount + j].angularDistance(s.rotation[size_t{b} * kJointCount + j]);
+    const double angle = s.rotation[size_t{a} * kJointCount + j].angularDistance(
+        s.rotation[size_t{b} * kJointCount + j]);
     sum += angle * angle / kMatchedJoints;
   }
   const double height = 5 * (s.root[a].y() - s.root[b].y());  // 1 cm counts as 0.05 rad
@@ -89,21 +99,25 @@ MotionClip make_loop(const MotionClip& clip, const LoopOptions& options, LoopRep
   const auto frames_of = [&](float seconds) {
     return static_cast<uint32_t>(std::lround(double{seconds} * double{clip.frames_per_second}));
   };
-  const uint32_t shortest = std::max(2 * kRateFrames, frames_of(options.shortest_s)), longest = frames_of(options.longest_s);
-  if (options.cycles == 0 || longest < shortest) throw InputError("loop: no cycles, or the longest cycle is shorter than the shortest");
+  const uint32_t shortest = std::max(2 * kRateFrames, frames_of(options.shortest_s)),
+                 longest = frames_of(options.longest_s);
+  if (options.cycles == 0 || longest < shortest)
+    throw InputError("loop: no cycles, or the longest cycle is shorter than the shortest");
   if (clip.frame_count < shortest + 2 * kRateFrames + 1) {
-    throw InputError(clip.name + ": loop: " + std::to_string(clip.frame_count) + " frames are too few for a cycle of " +
-                     std::to_string(shortest));
+    throw InputError(clip.name + ": loop: " + std::to_string(clip.frame_count) +
+                     " frames are too few for a cycle of " + std::to_string(shortest));
   }
   const Straight straight = straighten(clip, 0.5 * (shortest + longest));
 
   LoopReport report;
   double best = 1e30;
   for (uint32_t a = kRateFrames; a + shortest + kRateFrames < clip.frame_count; ++a) {
-    for (uint32_t length = shortest; length <= longest && a + length + kRateFrames < clip.frame_count; ++length) {
+    for (uint32_t length = shortest;
+         length <= longest && a + length + kRateFrames < clip.frame_count; ++length) {
       double distance = 0;
       for (int shift : {-static_cast<int>(kRateFrames), 0, static_cast<int>(kRateFrames)}) {
-        distance += squared_distance(straight, a + static_cast<uint32_t>(shift), a + length + static_cast<uint32_t>(shift));
+        distance += squared_distance(straight, a + static_cast<uint32_t>(shift),
+                                     a + length + static_cast<uint32_t>(shift));
       }
       if (distance < best) {
         best = distance;
@@ -118,7 +132,8 @@ MotionClip make_loop(const MotionClip& clip, const LoopOptions& options, LoopRep
   // What is missing at the end is spread over the cycle, a little to every frame.
   const Vec3 travelled = straight.root[b] - straight.root[a];
   Vec3 middle = Vec3::Zero();  // of the sway: the cycle is centred over the rest place
-  for (uint32_t phase = 0; phase < length; ++phase) middle += (straight.root[a + phase] - double(phase) / length * travelled) / length;
+  for (uint32_t phase = 0; phase < length; ++phase)
+    middle += (straight.root[a + phase] - double(phase) / length * travelled) / length;
   MotionClip out;
   out.name = clip.name;
   out.frames_per_second = clip.frames_per_second;
@@ -129,14 +144,18 @@ MotionClip make_loop(const MotionClip& clip, const LoopOptions& options, LoopRep
     for (uint32_t j = 0; j < kJointCount; ++j) {
       const Quat& first = straight.rotation[size_t{a} * kJointCount + j];
       const Quat& last = straight.rotation[size_t{b} * kJointCount + j];
-      const Quat closed = Quat::Identity().slerp(share, first * last.conjugate()) * straight.rotation[size_t{source} * kJointCount + j];
-      for (double value : {closed.w(), closed.x(), closed.y(), closed.z()}) out.rotations.push_back(static_cast<float>(value));
+      const Quat closed = Quat::Identity().slerp(share, first * last.conjugate()) *
+                          straight.rotation[size_t{source} * kJointCount + j];
+      for (double value : {closed.w(), closed.x(), closed.y(), closed.z()})
+        out.rotations.push_back(static_cast<float>(value));
     }
-    // The path leads straight along +z at the mean speed; sway to the sides and up and down closes like the rotations.
+    // The path leads straight along +z at the mean speed; sway to the sides and up and down closes
+    // like the rotations.
     Vec3 root = straight.root[source] - share * travelled;
     root.x() -= middle.x();
     root.z() -= middle.z();
-    if (!options.in_place) root.z() += std::hypot(travelled.x(), travelled.z()) * (f / length + share);
+    if (!options.in_place)
+      root.z() += std::hypot(travelled.x(), travelled.z()) * (f / length + share);
     for (int i = 0; i < 3; ++i) out.root_translation_m.push_back(static_cast<float>(root[i]));
   }
   make_continuous(out.rotations, kJointCount);

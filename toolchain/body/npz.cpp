@@ -18,11 +18,13 @@ constexpr size_t kMaxDimensions = 8;
 
 std::string shape_text(const std::vector<size_t>& shape) {
   std::string text = "(";
-  for (size_t i = 0; i < shape.size(); ++i) text += (i ? "," : "") + (shape[i] ? std::to_string(shape[i]) : std::string("any"));
+  for (size_t i = 0; i < shape.size(); ++i)
+    text += (i ? "," : "") + (shape[i] ? std::to_string(shape[i]) : std::string("any"));
   return text + ")";
 }
 
-// The header is a Python dict literal of three known keys. Only what NumPy itself writes is understood.
+// The header is a Python dict literal of three known keys. Only what NumPy itself writes is
+// understood.
 struct Header {
   std::string type;
   bool fortran_order = false;
@@ -48,10 +50,12 @@ Header parse_header(const std::string& text, const std::string& where) {
   if (type.size() < 4 || type.front() != '\'' || type[1] == '>')
     throw InputError(where + ": type " + type + ": not a plain little-endian array");
   header.type = type.substr(1, type.size() - 2);
-  if (header.type.find('O') != std::string::npos) throw InputError(where + ": holds pickled Python objects, which are never read");
+  if (header.type.find('O') != std::string::npos)
+    throw InputError(where + ": holds pickled Python objects, which are never read");
   const std::string order = value_of(text, "fortran_order", where);
   header.fortran_order = order.starts_with("True");
-  if (!header.fortran_order && !order.starts_with("False")) throw InputError(where + ": header: fortran_order is " + order);
+  if (!header.fortran_order && !order.starts_with("False"))
+    throw InputError(where + ": header: fortran_order is " + order);
   const std::string shape = value_of(text, "shape", where);
   if (shape.front() != '(') throw InputError(where + ": header: shape is no tuple");
   size_t value = 0;
@@ -69,7 +73,8 @@ Header parse_header(const std::string& text, const std::string& where) {
       throw InputError(where + ": header: shape has a '" + std::string(1, c) + "'");
     }
   }
-  if (header.shape.size() > kMaxDimensions) throw InputError(where + ": header: more than 8 dimensions");
+  if (header.shape.size() > kMaxDimensions)
+    throw InputError(where + ": header: more than 8 dimensions");
   return header;
 }
 
@@ -87,13 +92,15 @@ struct Type {
   size_t size;
   void (*convert)(const std::byte*, std::vector<double>&);
 };
-constexpr Type kTypes[] = {{"<f4", 4, convert<float>},    {"<f8", 8, convert<double>},   {"|u1", 1, convert<uint8_t>},
-                           {"|i1", 1, convert<int8_t>},   {"|b1", 1, convert<uint8_t>},  {"<u2", 2, convert<uint16_t>},
-                           {"<i2", 2, convert<int16_t>},  {"<u4", 4, convert<uint32_t>}, {"<i4", 4, convert<int32_t>},
-                           {"<u8", 8, convert<uint64_t>}, {"<i8", 8, convert<int64_t>}};
+constexpr Type kTypes[] = {
+    {"<f4", 4, convert<float>},    {"<f8", 8, convert<double>},   {"|u1", 1, convert<uint8_t>},
+    {"|i1", 1, convert<int8_t>},   {"|b1", 1, convert<uint8_t>},  {"<u2", 2, convert<uint16_t>},
+    {"<i2", 2, convert<int16_t>},  {"<u4", 4, convert<uint32_t>}, {"<i4", 4, convert<int32_t>},
+    {"<u8", 8, convert<uint64_t>}, {"<i8", 8, convert<int64_t>}};
 
 // Column-major to row-major.
-std::vector<double> transposed(const std::vector<double>& values, const std::vector<size_t>& shape) {
+std::vector<double> transposed(const std::vector<double>& values,
+                               const std::vector<size_t>& shape) {
   std::vector<double> out(values.size());
   std::vector<size_t> index(shape.size(), 0);
   for (double& slot : out) {
@@ -114,16 +121,21 @@ std::vector<double> transposed(const std::vector<double>& values, const std::vec
 }  // namespace
 
 NpyArray parse_npy(const std::vector<std::byte>& bytes, const std::string& where) {
-  if (bytes.size() < 10 || std::memcmp(bytes.data(), "\x93NUMPY", 6) != 0) throw InputError(where + ": not a .npy array");
+  if (bytes.size() < 10 || std::memcmp(bytes.data(), "\x93NUMPY", 6) != 0)
+    throw InputError(where + ": not a .npy array");
   const int version = static_cast<int>(bytes[6]);
-  if (version < 1 || version > 3) throw InputError(where + ": .npy version " + std::to_string(version));
+  if (version < 1 || version > 3)
+    throw InputError(where + ": .npy version " + std::to_string(version));
   const size_t length_bytes = version == 1 ? 2 : 4;
   if (bytes.size() < 8 + length_bytes) throw InputError(where + ": header: ends early");
   size_t header_bytes = 0;
-  for (size_t i = 0; i < length_bytes; ++i) header_bytes |= static_cast<size_t>(bytes[8 + i]) << (8 * i);
+  for (size_t i = 0; i < length_bytes; ++i)
+    header_bytes |= static_cast<size_t>(bytes[8 + i]) << (8 * i);
   const size_t data = 8 + length_bytes + header_bytes;
-  if (header_bytes > kMaxHeaderBytes || data > bytes.size()) throw InputError(where + ": header: length out of range");
-  const std::string text(reinterpret_cast<const char*>(bytes.data()) + 8 + length_bytes, header_bytes);
+  if (header_bytes > kMaxHeaderBytes || data > bytes.size())
+    throw InputError(where + ": header: length out of range");
+  const std::string text(reinterpret_cast<const char*>(bytes.data()) + 8 + length_bytes,
+                         header_bytes);
   const Header header = parse_header(text, where);
 
   const Type* type = nullptr;
@@ -133,16 +145,19 @@ NpyArray parse_npy(const std::vector<std::byte>& bytes, const std::string& where
   if (type == nullptr) throw InputError(where + ": type " + header.type + ": not supported");
   uint64_t count = 1;
   for (size_t extent : header.shape) {
-    if (extent != 0 && count > kMaxArrayBytes / extent) throw InputError(where + ": shape: overflows");
+    if (extent != 0 && count > kMaxArrayBytes / extent)
+      throw InputError(where + ": shape: overflows");
     count *= extent;
   }
   if (bytes.size() - data != count * type->size) {
-    throw InputError(where + ": shape " + shape_text(header.shape) + " needs " + std::to_string(count * type->size) + " bytes, has " +
+    throw InputError(where + ": shape " + shape_text(header.shape) + " needs " +
+                     std::to_string(count * type->size) + " bytes, has " +
                      std::to_string(bytes.size() - data));
   }
   NpyArray array{header.shape, std::vector<double>(count)};
   type->convert(bytes.data() + data, array.values);
-  if (header.fortran_order && header.shape.size() > 1) array.values = transposed(array.values, header.shape);
+  if (header.fortran_order && header.shape.size() > 1)
+    array.values = transposed(array.values, header.shape);
   return array;
 }
 
@@ -174,14 +189,17 @@ NpzFile NpzFile::open(const std::string& path) {
   return NpzFile(std::move(archive));
 }
 
-bool NpzFile::has(const std::string& name) const { return zip_name_locate(archive_->zip, (name + ".npy").c_str(), 0) >= 0; }
+bool NpzFile::has(const std::string& name) const {
+  return zip_name_locate(archive_->zip, (name + ".npy").c_str(), 0) >= 0;
+}
 
 NpyArray NpzFile::read(const std::string& name) const {
   const std::string where = archive_->path + ": " + name;
   const zip_int64_t index = zip_name_locate(archive_->zip, (name + ".npy").c_str(), 0);
   if (index < 0) throw InputError(where + ": no such array");
   zip_stat_t stat;
-  if (zip_stat_index(archive_->zip, static_cast<zip_uint64_t>(index), 0, &stat) != 0 || (stat.valid & ZIP_STAT_SIZE) == 0) {
+  if (zip_stat_index(archive_->zip, static_cast<zip_uint64_t>(index), 0, &stat) != 0 ||
+      (stat.valid & ZIP_STAT_SIZE) == 0) {
     throw InputError(where + ": its size is not known");
   }
   if (stat.size > kMaxArrayBytes) throw InputError(where + ": larger than 1 GiB");
@@ -190,17 +208,21 @@ NpyArray NpzFile::read(const std::string& name) const {
   std::vector<std::byte> bytes(stat.size);
   const zip_int64_t got = zip_fread(file, bytes.data(), bytes.size());
   std::byte beyond;
-  const bool complete = got == static_cast<zip_int64_t>(bytes.size()) && zip_fread(file, &beyond, 1) == 0;  // reading on checks the CRC
-  if (zip_fclose(file) != 0 || !complete) throw InputError(where + ": damaged: wrong length or checksum");
+  const bool complete = got == static_cast<zip_int64_t>(bytes.size()) &&
+                        zip_fread(file, &beyond, 1) == 0;  // reading on checks the CRC
+  if (zip_fclose(file) != 0 || !complete)
+    throw InputError(where + ": damaged: wrong length or checksum");
   return parse_npy(bytes, where);
 }
 
 NpyArray NpzFile::read(const std::string& name, const std::vector<size_t>& shape) const {
   NpyArray array = read(name);
   bool equal = array.shape.size() == shape.size();
-  for (size_t i = 0; equal && i < shape.size(); ++i) equal = shape[i] == 0 || shape[i] == array.shape[i];
+  for (size_t i = 0; equal && i < shape.size(); ++i)
+    equal = shape[i] == 0 || shape[i] == array.shape[i];
   if (!equal) {
-    throw InputError(archive_->path + ": " + name + ": shape " + shape_text(array.shape) + ", expected " + shape_text(shape));
+    throw InputError(archive_->path + ": " + name + ": shape " + shape_text(array.shape) +
+                     ", expected " + shape_text(shape));
   }
   return array;
 }

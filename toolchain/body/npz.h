@@ -1,6 +1,8 @@
-// Reads arrays from NumPy's .npz (a zip of .npy) without Python and without ever unpickling: object arrays are refused.
+// Reads arrays from NumPy's .npz (a zip of .npy) without Python and without ever unpickling: object
+// arrays are refused.
 //
-// Based on: NumPy Enhancement Proposal 1, "A simple file format for NumPy arrays" (versions 1.0 to 3.0).
+// Based on: NumPy Enhancement Proposal 1, "A simple file format for NumPy arrays" (versions 1.0
+// to 3.0).
 #pragma once
 
 #include <cstddef>
@@ -13,10 +15,12 @@ namespace figurine::body {
 
 struct NpyArray {
   std::vector<size_t> shape;
-  std::vector<double> values;  // row-major, whatever the file's order and type; exact for every type but 64-bit integers beyond 2^53
+  std::vector<double> values;  // row-major, whatever the file's order and type; exact for every
+                               // type but 64-bit integers beyond 2^53
 };
 
-// Parses one .npy. where appears in messages. InputError on anything unsound: magic, header, type, shape times size, surplus bytes.
+// Parses one .npy. where appears in messages. InputError on anything unsound: magic, header, type,
+// shape times size, surplus bytes.
 NpyArray parse_npy(const std::vector<std::byte>& bytes, const std::string& where);
 
 class NpzFile {

@@ -1,7 +1,8 @@
-// The 55 joints of SMPL-X: names, order and parents. Every body of this project uses them, whatever mesh it comes from.
+// The 55 joints of SMPL-X: names, order and parents. Every body of this project uses them, whatever
+// mesh it comes from.
 //
-// Based on: Pavlakos et al., Expressive Body Capture: 3D Hands, Face, and Body from a Single Image (SMPL-X), 2019: the joint tree only, no
-// data.
+// Based on: Pavlakos et al., Expressive Body Capture: 3D Hands, Face, and Body from a Single Image
+// (SMPL-X), 2019: the joint tree only, no data.
 #pragma once
 
 #include <array>
@@ -13,7 +14,8 @@ namespace figurine::body {
 
 inline constexpr uint32_t kJointCount = 55;
 
-// Indices that code speaks of by name. Left is the figure's own left, +x for a figure that faces +z.
+// Indices that code speaks of by name. Left is the figure's own left, +x for a figure that faces
+// +z.
 enum Joint : uint8_t {
   kPelvis = 0,
   kLeftHip = 1,

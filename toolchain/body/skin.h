@@ -1,4 +1,5 @@
-// Skin weights of one point: collects any number of influences and keeps the K heaviest, renormalised.
+// Skin weights of one point: collects any number of influences and keeps the K heaviest,
+// renormalised.
 #pragma once
 
 #include <algorithm>
@@ -17,15 +18,18 @@ class SkinAccumulator {
 
   // Number of joints with a positive weight.
   int influence_count() const {
-    return static_cast<int>(std::count_if(sum_.begin(), sum_.end(), [](double w) { return w > 0; }));
+    return static_cast<int>(
+        std::count_if(sum_.begin(), sum_.end(), [](double w) { return w > 0; }));
   }
 
-  // Writes kSkinInfluences joints and weights, heaviest first (ties: lower joint first), summing to 1; unused entries are joint 0 with
-  // weight 0. A point without influence hangs on the root. Returns the share of weight that the kept influences do not hold.
+  // Writes kSkinInfluences joints and weights, heaviest first (ties: lower joint first), summing to
+  // 1; unused entries are joint 0 with weight 0. A point without influence hangs on the root.
+  // Returns the share of weight that the kept influences do not hold.
   double store(uint8_t* joints, float* weights, uint32_t keep = kSkinInfluences) const {
     std::array<uint8_t, kJointCount> order;
     std::iota(order.begin(), order.end(), uint8_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](uint8_t a, uint8_t b) { return sum_[a] > sum_[b]; });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](uint8_t a, uint8_t b) { return sum_[a] > sum_[b]; });
     const double total = std::accumulate(sum_.begin(), sum_.end(), 0.0);
     double kept = 0;
     for (uint32_t k = 0; k < keep; ++k) kept += sum_[order[k]];

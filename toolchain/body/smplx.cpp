@@ -17,8 +17,9 @@ constexpr double kMaxCoordinate = 100;  // metres: a file in millimetres is not 
 void check_range(const NpyArray& array, double low, double high, const std::string& where) {
   for (size_t i = 0; i < array.values.size(); ++i) {
     if (!(array.values[i] >= low && array.values[i] <= high)) {
-      throw InputError(where + ": value " + std::to_string(i) + " is " + std::to_string(array.values[i]) + ", not within " +
-                       std::to_string(low) + " and " + std::to_string(high));
+      throw InputError(where + ": value " + std::to_string(i) + " is " +
+                       std::to_string(array.values[i]) + ", not within " + std::to_string(low) +
+                       " and " + std::to_string(high));
     }
   }
 }
@@ -35,12 +36,15 @@ void check_tree(const NpyArray& table, const std::string& where) {
 
 std::vector<uint32_t> indices(const NpyArray& array) {
   std::vector<uint32_t> out(array.values.size());
-  std::transform(array.values.begin(), array.values.end(), out.begin(), [](double value) { return static_cast<uint32_t>(value); });
+  std::transform(array.values.begin(), array.values.end(), out.begin(),
+                 [](double value) { return static_cast<uint32_t>(value); });
   return out;
 }
 
-// regressor [55,V] times one [V,3] array with a stride of `step` values between vertices and components.
-JointPositions regress(const NpyArray& regressor, const std::vector<double>& values, size_t vertices, size_t first, size_t step) {
+// regressor [55,V] times one [V,3] array with a stride of `step` values between vertices and
+// components.
+JointPositions regress(const NpyArray& regressor, const std::vector<double>& values,
+                       size_t vertices, size_t first, size_t step) {
   JointPositions joints{};
   for (uint32_t j = 0; j < kJointCount; ++j) {
     double sum[3] = {0, 0, 0};
@@ -61,7 +65,8 @@ BodyModel read_smplx(const std::string& path) {
   const auto where = [&](const char* name) { return path + ": " + name; };
   NpyArray positions = file.read("v_template", {0, 3});
   const size_t vertices = positions.shape[0];
-  if (vertices < 3 || vertices > kMaxVertices) throw InputError(where("v_template") + ": " + std::to_string(vertices) + " vertices");
+  if (vertices < 3 || vertices > kMaxVertices)
+    throw InputError(where("v_template") + ": " + std::to_string(vertices) + " vertices");
   check_range(positions, -kMaxCoordinate, kMaxCoordinate, where("v_template"));
   const NpyArray faces = file.read("f", {0, 3});
   const NpyArray uv_faces = file.read("ft", {faces.shape[0], 3});
@@ -80,7 +85,8 @@ BodyModel read_smplx(const std::string& path) {
     double sum = 0;
     for (size_t v = 0; v < vertices; ++v) sum += regressor.values[j * vertices + v];
     if (!(std::abs(sum - 1) < 1e-3))
-      throw InputError(where("J_regressor") + ": row " + std::to_string(j) + " sums to " + std::to_string(sum) + ", not 1");
+      throw InputError(where("J_regressor") + ": row " + std::to_string(j) + " sums to " +
+                       std::to_string(sum) + ", not 1");
   }
 
   BodyModel model;
@@ -93,26 +99,31 @@ BodyModel read_smplx(const std::string& path) {
   surface.triangles = indices(faces);
   surface.uv_triangles = indices(uv_faces);
   surface.uv.resize(uvs.values.size());
-  for (size_t i = 0; i < uvs.values.size(); ++i) surface.uv[i] = static_cast<float>(i % 2 == 0 ? uvs.values[i] : 1 - uvs.values[i]);
+  for (size_t i = 0; i < uvs.values.size(); ++i)
+    surface.uv[i] = static_cast<float>(i % 2 == 0 ? uvs.values[i] : 1 - uvs.values[i]);
   surface.hidden.assign(surface.triangle_count(), 0);
   surface.skin_joints.resize(vertices * kSkinInfluences);
   surface.skin_weights.resize(vertices * kSkinInfluences);
   for (size_t v = 0; v < vertices; ++v) {
     SkinAccumulator skin;
     for (uint32_t j = 0; j < kJointCount; ++j) skin.add(j, weights.values[v * kJointCount + j]);
-    skin.store(&surface.skin_joints[v * kSkinInfluences], &surface.skin_weights[v * kSkinInfluences]);
+    skin.store(&surface.skin_joints[v * kSkinInfluences],
+               &surface.skin_weights[v * kSkinInfluences]);
   }
   model.joint_m = regress(regressor, positions.values, vertices, 0, 1);
 
   const size_t all = directions.shape[2];
   if (all == 0) throw InputError(where("shapedirs") + ": no shape directions");
-  model.shape_count = static_cast<uint32_t>(std::min<size_t>(kMaxCoefficients, all <= 20 ? (all + 1) / 2 : all));
+  model.shape_count =
+      static_cast<uint32_t>(std::min<size_t>(kMaxCoefficients, all <= 20 ? (all + 1) / 2 : all));
   for (size_t s = 0; s < model.shape_count; ++s) {
-    for (size_t i = 0; i < vertices * 3; ++i) model.vertex_shape_basis_m.push_back(static_cast<float>(directions.values[i * all + s]));
+    for (size_t i = 0; i < vertices * 3; ++i)
+      model.vertex_shape_basis_m.push_back(static_cast<float>(directions.values[i * all + s]));
     const JointPositions joints = regress(regressor, directions.values, vertices, s, all);
     model.joint_shape_basis_m.insert(model.joint_shape_basis_m.end(), joints.begin(), joints.end());
   }
-  model.provenance.sources = {"SMPL-X model file supplied by the user; its licence forbids redistribution"};
+  model.provenance.sources = {
+      "SMPL-X model file supplied by the user; its licence forbids redistribution"};
   model.provenance.licence_name = "SMPL-X model licence (not redistributable)";
   model.provenance.licence_url = "https://smpl-x.is.tue.mpg.de/modellicense.html";
   model.provenance.avatar_permission = "onlyAuthor";

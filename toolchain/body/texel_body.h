@@ -1,8 +1,10 @@
-// Turns a surface with UV charts into the texels of a body package at any resolution T (formats/include/figurine/body.h).
+// Turns a surface with UV charts into the texels of a body package at any resolution T
+// (formats/include/figurine/body.h).
 //
-// A texel is covered if its centre lies in a triangle of the UV map that is not hidden; everything it holds is interpolated barycentrically
-// there. Texels within two of a covered one are border: they repeat the nearest covered texel, so that convolutions at a chart's edge see
-// their own chart.
+// A texel is covered if its centre lies in a triangle of the UV map that is not hidden; everything
+// it holds is interpolated barycentrically there. Texels within two of a covered one are border:
+// they repeat the nearest covered texel, so that convolutions at a chart's edge see their own
+// chart.
 #pragma once
 
 #include <cstdint>
@@ -36,8 +38,9 @@ struct TexelBody {
   figurine::Body view() const;  // borrows from this
 };
 
-// uv_size: 8 to kMaxUvSize. Degenerate UV triangles cover nothing. Where triangles overlap in the UV map, the first in the list wins.
-// InputError if a triangle's UV leaves [0,1], or if nothing is covered.
+// uv_size: 8 to kMaxUvSize. Degenerate UV triangles cover nothing. Where triangles overlap in the
+// UV map, the first in the list wins. InputError if a triangle's UV leaves [0,1], or if nothing is
+// covered.
 TexelBody make_texel_body(const BodyModel& model, uint32_t uv_size);
 
 }  // namespace figurine::body

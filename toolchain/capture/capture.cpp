@@ -40,25 +40,31 @@ struct Session {
   }
 };
 
-// Moves every pose until its lowest point touches y = 0 and the middle of its outline stands over the origin, so that neither jumps nor
-// leaning cost image size, and returns where the figure then reaches in any of its poses.
+// Moves every pose until its lowest point touches y = 0 and the middle of its outline stands over
+// the origin, so that neither jumps nor leaning cost image size, and returns where the figure then
+// reaches in any of its poses.
 std::vector<Vec3> place_poses(Session& session, const Body& body) {
   std::vector<float> position, weights;
   std::vector<uint8_t> joints;
   for (const Mesh& mesh : session.person.meshes) {
     for (uint32_t v = 0; v < mesh.vertex_count(); v += kFramingStride) {
       position.insert(position.end(), &mesh.position_m[v * 3], &mesh.position_m[v * 3] + 3);
-      joints.insert(joints.end(), &mesh.skin_joints[v * kSkinInfluences], &mesh.skin_joints[v * kSkinInfluences] + kSkinInfluences);
-      weights.insert(weights.end(), &mesh.skin_weights[v * kSkinInfluences], &mesh.skin_weights[v * kSkinInfluences] + kSkinInfluences);
+      joints.insert(joints.end(), &mesh.skin_joints[v * kSkinInfluences],
+                    &mesh.skin_joints[v * kSkinInfluences] + kSkinInfluences);
+      weights.insert(weights.end(), &mesh.skin_weights[v * kSkinInfluences],
+                     &mesh.skin_weights[v * kSkinInfluences] + kSkinInfluences);
     }
   }
   std::vector<Vec3> points;
   for (size_t f = 0; f < session.sequence.size(); ++f) {
-    const std::vector<float> posed = body::skin_positions(position, joints, weights, session.transforms(f, body));
+    const std::vector<float> posed =
+        body::skin_positions(position, joints, weights, session.transforms(f, body));
     Vec3 low = load(posed.data()), high = low;
     for (size_t i = 0; i < posed.size(); i += 3) {
-      low = {std::min(low.x, posed[i]), std::min(low.y, posed[i + 1]), std::min(low.z, posed[i + 2])};
-      high = {std::max(high.x, posed[i]), std::max(high.y, posed[i + 1]), std::max(high.z, posed[i + 2])};
+      low = {std::min(low.x, posed[i]), std::min(low.y, posed[i + 1]),
+             std::min(low.z, posed[i + 2])};
+      high = {std::max(high.x, posed[i]), std::max(high.y, posed[i + 1]),
+              std::max(high.z, posed[i + 2])};
     }
     const Vec3 shift{-(low.x + high.x) / 2, -low.y, -(low.z + high.z) / 2};
     std::array<float, 3>& translation = session.sequence[f].pose.root_translation_m;
@@ -68,18 +74,20 @@ std::vector<Vec3> place_poses(Session& session, const Body& body) {
   return points;
 }
 
-Session prepare(const CaptureRequest& request, uint32_t identity, const Package& package, const body::MakeHuman* makehuman,
-                const std::vector<body::MotionClip>& motions) {
+Session prepare(const CaptureRequest& request, uint32_t identity, const Package& package,
+                const body::MakeHuman* makehuman, const std::vector<body::MotionClip>& motions) {
   const Body& body = package.body();
   Session session;
   const PersonRequest person{.seed = person_seed(request.seed, identity), .limits = request.limits};
-  session.person =
-      makehuman != nullptr ? make_makehuman_person(person, *makehuman, request.makehuman, body) : make_mannequin_person(person, body);
+  session.person = makehuman != nullptr
+                       ? make_makehuman_person(person, *makehuman, request.makehuman, body)
+                       : make_mannequin_person(person, body);
   session.joints_m.resize(size_t{body.joint_count()} * 3);
   std::vector<float> texels(size_t{body.texel_count()} * 3);
   shape_body(body, session.person.shape, session.joints_m, texels);
   const std::array<float, 3> root{session.joints_m[0], session.joints_m[1], session.joints_m[2]};
-  session.sequence = make_sequence(motions, {.frames = request.frames, .seed = person.seed, .root_rest_m = root});
+  session.sequence =
+      make_sequence(motions, {.frames = request.frames, .seed = person.seed, .root_rest_m = root});
   session.rig = make_rig(request.rig, place_poses(session, body));
   session.record = {.identity = identity,
                     .seed = request.seed,
@@ -90,14 +98,18 @@ Session prepare(const CaptureRequest& request, uint32_t identity, const Package&
                     .folds = to_string(request.folds),
                     .limits = request.limits,
                     .root_rest_m = root};
-  if (makehuman != nullptr) session.record.sources.insert(session.record.sources.begin(), body::MakeHuman::source_line());
+  if (makehuman != nullptr)
+    session.record.sources.insert(session.record.sources.begin(), body::MakeHuman::source_line());
   return session;
 }
 
-// Counts images and asks the callback whether to go on; stops all workers at its first no or the first error.
+// Counts images and asks the callback whether to go on; stops all workers at its first no or the
+// first error.
 class Tally {
  public:
-  Tally(const CaptureCallback& callback, uint64_t total) : callback_(callback) { progress_.images_total = total; }
+  Tally(const CaptureCallback& callback, uint64_t total) : callback_(callback) {
+    progress_.images_total = total;
+  }
   void count(uint64_t images) {
     const std::lock_guard lock(mutex_);
     progress_.images_done += images;
@@ -121,8 +133,10 @@ class Tally {
   std::exception_ptr error_;
 };
 
-// A frame is one piece of work: its pose is skinned and its ambient light gathered once for all cameras.
-void photograph(const Session& session, const IdentityLayout& layout, const Body& body, FoldMode folds, uint32_t threads, Tally& tally) {
+// A frame is one piece of work: its pose is skinned and its ambient light gathered once for all
+// cameras.
+void photograph(const Session& session, const IdentityLayout& layout, const Body& body,
+                FoldMode folds, uint32_t threads, Tally& tally) {
   std::atomic<size_t> next{0};
   const auto work = [&] {
     try {
@@ -151,7 +165,9 @@ void photograph(const Session& session, const IdentityLayout& layout, const Body
 
 }  // namespace
 
-uint64_t person_seed(uint64_t seed, uint32_t identity) { return Random(seed, kIdentityStream).bits(identity); }
+uint64_t person_seed(uint64_t seed, uint32_t identity) {
+  return Random(seed, kIdentityStream).bits(identity);
+}
 
 std::string identity_name(uint32_t identity) {
   char name[16];
@@ -159,20 +175,24 @@ std::string identity_name(uint32_t identity) {
   return name;
 }
 
-CaptureEnd capture_identities(const CaptureRequest& request, const Package& package, const std::vector<body::MotionClip>& motions,
+CaptureEnd capture_identities(const CaptureRequest& request, const Package& package,
+                              const std::vector<body::MotionClip>& motions,
                               const CaptureCallback& callback) {
   const Body& body = package.body();
   std::optional<body::MakeHuman> makehuman;
   if (body.name == "makehuman") {
     makehuman = body::MakeHuman::load(request.makehuman);
   } else if (body.name != "mannequin") {
-    throw InputError("--body: captures are made of a makehuman or mannequin body, not of '" + body.name + "'");
+    throw InputError("--body: captures are made of a makehuman or mannequin body, not of '" +
+                     body.name + "'");
   }
   Tally tally(callback, uint64_t{request.identities} * request.frames * request.rig.views);
   for (uint32_t i = 0; i < request.identities && !tally.stopped(); ++i) {
     const uint32_t identity = request.first_identity + i;
-    const Session session = prepare(request, identity, package, makehuman ? &*makehuman : nullptr, motions);
-    IdentityLayout layout(request.output + "/" + identity_name(identity), session.record, session.person, session.rig, session.sequence);
+    const Session session =
+        prepare(request, identity, package, makehuman ? &*makehuman : nullptr, motions);
+    IdentityLayout layout(request.output + "/" + identity_name(identity), session.record,
+                          session.person, session.rig, session.sequence);
     layout.begin(request.resume);
     photograph(session, layout, body, request.folds, request.threads, tally);
     tally.rethrow();
@@ -184,7 +204,8 @@ CaptureEnd capture_identities(const CaptureRequest& request, const Package& pack
 
 namespace {
 
-// Cells of a sheet: images over mid-grey, cut to their middle, because the sides of a square image of a standing figure are empty.
+// Cells of a sheet: images over mid-grey, cut to their middle, because the sides of a square image
+// of a standing figure are empty.
 class Sheet {
  public:
   Sheet(uint32_t columns, uint32_t rows, const Camera& size)
@@ -200,7 +221,8 @@ class Sheet {
     for (uint32_t y = 0; y < height_; ++y) {
       for (uint32_t x = 0; x < width_; ++x) {
         const size_t from = size_t{y} * image_width + x + cut;
-        uint8_t* to = image_.at(static_cast<uint32_t>(cell % columns_) * width_ + x, static_cast<uint32_t>(cell / columns_) * height_ + y);
+        uint8_t* to = image_.at(static_cast<uint32_t>(cell % columns_) * width_ + x,
+                                static_cast<uint32_t>(cell / columns_) * height_ + y);
         for (int c = 0; c < 3; ++c) {
           const uint32_t over = image.rgb[from * 3 + c] + (255u - image.alpha[from]) * kGrey / 255;
           to[c] = static_cast<uint8_t>(std::min(255u, over));
@@ -219,13 +241,15 @@ class Sheet {
 
 // The camera that the figure's chest looks at most nearly.
 size_t front_camera(const dataset::Dataset& data, size_t frame) {
-  const std::array<float, 9> turn = rotation_from_quaternion(data.frames()[frame].pose().rotations.data());
+  const std::array<float, 9> turn =
+      rotation_from_quaternion(data.frames()[frame].pose().rotations.data());
   const Vec3 front{turn[2], turn[5], turn[8]};
   size_t best = 0;
   float most = -2;
   for (size_t c = 0; c < data.cameras().size(); ++c) {
     const auto& m = data.cameras()[c].camera.view_from_world;
-    const float facing = -dot(front, Vec3{m[8], m[9], m[10]});  // the third row is the camera's own direction
+    const float facing =
+        -dot(front, Vec3{m[8], m[9], m[10]});  // the third row is the camera's own direction
     if (facing > most) best = c, most = facing;
   }
   return best;
@@ -233,22 +257,29 @@ size_t front_camera(const dataset::Dataset& data, size_t frame) {
 
 }  // namespace
 
-ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns, uint32_t rows) {
+ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns,
+                             uint32_t rows) {
   const dataset::Dataset data = dataset::Dataset::open(identity_directory);
-  const size_t frames = data.frames().size(), cameras = data.cameras().size(), cells = size_t{columns} * rows;
+  const size_t frames = data.frames().size(), cameras = data.cameras().size(),
+               cells = size_t{columns} * rows;
   Sheet sheet(columns, rows, data.cameras()[0].camera);
   for (size_t i = 0; i < cells; ++i) {
-    sheet.put(i, data.load_image(i * frames / cells, (i * 7 + i / columns) % cameras), data.cameras()[0].camera.width_px);
+    sheet.put(i, data.load_image(i * frames / cells, (i * 7 + i / columns) % cameras),
+              data.cameras()[0].camera.width_px);
   }
   return sheet.take();
 }
 
-ports::ImageU8 people_sheet(const std::vector<std::string>& identity_directories, uint32_t columns) {
+ports::ImageU8 people_sheet(const std::vector<std::string>& identity_directories,
+                            uint32_t columns) {
   std::optional<Sheet> sheet;
   for (size_t i = 0; i < identity_directories.size(); ++i) {
     const dataset::Dataset data = dataset::Dataset::open(identity_directories[i]);
     const Camera& size = data.cameras()[0].camera;
-    if (!sheet) sheet.emplace(columns, static_cast<uint32_t>((identity_directories.size() + columns - 1) / columns), size);
+    if (!sheet)
+      sheet.emplace(columns,
+                    static_cast<uint32_t>((identity_directories.size() + columns - 1) / columns),
+                    size);
     const size_t frame = i % data.frames().size();
     sheet->put(i, data.load_image(frame, front_camera(data, frame)), size.width_px);
   }

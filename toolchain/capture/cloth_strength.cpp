@@ -42,7 +42,8 @@ std::vector<float> border_distance(const Mesh& mesh, float limit_m) {
   using Entry = std::pair<float, uint32_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
   for (const auto& [edge, count] : faces_of) {
-    const float size = length(load(&mesh.position_m[size_t{edge[0]} * 3]) - load(&mesh.position_m[size_t{edge[1]} * 3]));
+    const float size = length(load(&mesh.position_m[size_t{edge[0]} * 3]) -
+                              load(&mesh.position_m[size_t{edge[1]} * 3]));
     for (int k = 0; k < 2; ++k) {
       neighbours[edge[k]].push_back({edge[1 - k], size});
       if (count == 1) distance[edge[k]] = 0, queue.push({0.0f, edge[k]});
@@ -61,8 +62,9 @@ std::vector<float> border_distance(const Mesh& mesh, float limit_m) {
 
 // Whether cloth does not lie on the parts of the body that follow this joint.
 bool is_bare(uint8_t joint) {
-  return joint == body::kHead || joint == body::kNeck || joint == body::kJaw || joint == body::kLeftEye || joint == body::kRightEye ||
-         joint == body::kLeftAnkle || joint == body::kRightAnkle || joint == body::kLeftFoot || joint == body::kRightFoot ||
+  return joint == body::kHead || joint == body::kNeck || joint == body::kJaw ||
+         joint == body::kLeftEye || joint == body::kRightEye || joint == body::kLeftAnkle ||
+         joint == body::kRightAnkle || joint == body::kLeftFoot || joint == body::kRightFoot ||
          joint == body::kLeftWrist || joint == body::kRightWrist || joint > body::kRightEye;
 }
 
@@ -71,7 +73,8 @@ bool is_bare(uint8_t joint) {
 std::vector<float> cloth_strength(const Mesh& mesh, float fade_m) {
   constexpr float kSmallestPart_m = 0.25f;  // diagonal of its box
   const std::vector<uint32_t> part = connected_parts(mesh);
-  std::vector<std::array<Vec3, 2>> box(mesh.vertex_count(), {Vec3{1e9f, 1e9f, 1e9f}, Vec3{-1e9f, -1e9f, -1e9f}});
+  std::vector<std::array<Vec3, 2>> box(mesh.vertex_count(),
+                                       {Vec3{1e9f, 1e9f, 1e9f}, Vec3{-1e9f, -1e9f, -1e9f}});
   for (uint32_t v = 0; v < mesh.vertex_count(); ++v) {
     const Vec3 p = load(&mesh.position_m[size_t{v} * 3]);
     auto& [low, high] = box[part[v]];

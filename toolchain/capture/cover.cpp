@@ -9,14 +9,17 @@
 
 namespace figurine::capture {
 
-std::vector<uint8_t> covered_vertices(const Mesh& mesh, const Mesh& garment, const CoverReach& reach) {
+std::vector<uint8_t> covered_vertices(const Mesh& mesh, const Mesh& garment,
+                                      const CoverReach& reach) {
   RTCDevice device = rtcNewDevice("threads=1,isa=avx2");
   FIG_CHECK(device != nullptr, "Embree gives a device");
   RTCScene scene = rtcNewScene(device);
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, garment.vertex_count());
+  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                           12, garment.vertex_count());
   std::memcpy(vertices, garment.position_m.data(), garment.position_m.size() * sizeof(float));
-  void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, garment.triangle_count());
+  void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                            12, garment.triangle_count());
   std::memcpy(triangles, garment.triangles.data(), garment.triangles.size() * sizeof(uint32_t));
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene, geometry);
@@ -47,7 +50,8 @@ std::vector<uint8_t> covered_vertices(const Mesh& mesh, const Mesh& garment, con
 void remove_triangles(Mesh& mesh, const std::vector<uint8_t>& marked) {
   size_t kept = 0;
   for (size_t t = 0; t < mesh.triangles.size(); t += 3) {
-    if (marked[mesh.triangles[t]] && marked[mesh.triangles[t + 1]] && marked[mesh.triangles[t + 2]]) continue;
+    if (marked[mesh.triangles[t]] && marked[mesh.triangles[t + 1]] && marked[mesh.triangles[t + 2]])
+      continue;
     for (size_t c = 0; c < 3; ++c) {
       mesh.triangles[kept + c] = mesh.triangles[t + c];
       mesh.uv_triangles[kept + c] = mesh.uv_triangles[t + c];

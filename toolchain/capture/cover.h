@@ -1,5 +1,6 @@
-// Which parts of one mesh another garment covers in the rest pose: socks under trousers, skin under a shirt. What is covered is not drawn,
-// so that it cannot poke through where two fitted surfaces lie within millimetres of each other.
+// Which parts of one mesh another garment covers in the rest pose: socks under trousers, skin under
+// a shirt. What is covered is not drawn, so that it cannot poke through where two fitted surfaces
+// lie within millimetres of each other.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@ struct CoverReach {
 };
 
 // [V] 1: the garment crosses the vertex' normal within reach.
-std::vector<uint8_t> covered_vertices(const Mesh& mesh, const Mesh& garment, const CoverReach& reach = {});
+std::vector<uint8_t> covered_vertices(const Mesh& mesh, const Mesh& garment,
+                                      const CoverReach& reach = {});
 
 // Removes the triangles whose corners are all marked. Vertices stay.
 void remove_triangles(Mesh& mesh, const std::vector<uint8_t>& marked);

@@ -44,8 +44,9 @@ void write_bytes(const std::string& path, std::span<const std::byte> bytes) {
   throw_if_error(ports::write_file_atomically(path, bytes), "-o");
 }
 
-// Whole or not at all, but not synced one by one: thousands of images would spend their time waiting for the disk. finish() syncs them
-// together, before figurine.json calls the capture complete.
+// Whole or not at all, but not synced one by one: thousands of images would spend their time
+// waiting for the disk. finish() syncs them together, before figurine.json calls the capture
+// complete.
 void write_unsynced(const std::string& path, std::span<const std::byte> bytes) {
   const std::string temporary = path + ".tmp";
   std::FILE* file = std::fopen(temporary.c_str(), "wb");
@@ -67,7 +68,8 @@ void sync_file_system_of(const std::string& directory) {
   if (!synced) throw InputError(directory + ": " + reason);
 }
 
-// A file that is there and not empty: what a crash may leave of an image that was not synced is empty.
+// A file that is there and not empty: what a crash may leave of an image that was not synced is
+// empty.
 bool has_content(const std::string& path) {
   std::error_code error;
   const auto size = fs::file_size(path, error);
@@ -77,22 +79,27 @@ bool has_content(const std::string& path) {
 // Axis times angle, the angle in [0, pi].
 std::array<double, 3> rotation_vector(const float* wxyz) {
   const double sign = wxyz[0] < 0 ? -1 : 1;
-  const double x = sign * wxyz[1], y = sign * wxyz[2], z = sign * wxyz[3], length = std::sqrt(x * x + y * y + z * z);
+  const double x = sign * wxyz[1], y = sign * wxyz[2], z = sign * wxyz[3],
+               length = std::sqrt(x * x + y * y + z * z);
   if (length < 1e-12) return {0, 0, 0};
   const double scale = 2 * std::atan2(length, sign * wxyz[0]) / length;
   return {scale * x, scale * y, scale * z};
 }
 
-// The smplx file of one frame, as MVHumanNet's fits have it: Rh and Th about the origin, 87 numbers of pose, ten of shape. Hands are lost
-// here (their 6 + 6 numbers are zero): figurine.json holds them.
-ordered_json smplx_person(const CapturedPose& captured, const std::vector<float>& shape, const std::array<float, 3>& root_rest_m) {
+// The smplx file of one frame, as MVHumanNet's fits have it: Rh and Th about the origin, 87 numbers
+// of pose, ten of shape. Hands are lost here (their 6 + 6 numbers are zero): figurine.json holds
+// them.
+ordered_json smplx_person(const CapturedPose& captured, const std::vector<float>& shape,
+                          const std::array<float, 3>& root_rest_m) {
   const std::vector<float>& rotations = captured.pose.rotations;
   const auto add = [&](ordered_json& list, int joint) {
     for (double v : rotation_vector(&rotations[size_t(joint) * 4])) list.push_back(v);
   };
-  ordered_json rh = ordered_json::array(), th = ordered_json::array(), poses = ordered_json::array({0.0, 0.0, 0.0});
+  ordered_json rh = ordered_json::array(), th = ordered_json::array(),
+               poses = ordered_json::array({0.0, 0.0, 0.0});
   add(rh, 0);
-  // Our root turns about its joint r: x -> R (x - r) + r + t. About the origin that is R x + Th with Th = r + t - R r.
+  // Our root turns about its joint r: x -> R (x - r) + r + t. About the origin that is R x + Th
+  // with Th = r + t - R r.
   const std::array<float, 9> turn = rotation_from_quaternion(rotations.data());
   for (int i = 0; i < 3; ++i) {
     double turned = 0;
@@ -107,13 +114,19 @@ ordered_json smplx_person(const CapturedPose& captured, const std::vector<float>
     shapes.push_back(i < shape.size() ? decimal(shape[i]) : 0.0);
     expression.push_back(0.0);
   }
-  return {{"id", 0}, {"Rh", {rh}}, {"Th", {th}}, {"poses", {poses}}, {"expression", {expression}}, {"shapes", {shapes}}};
+  return {{"id", 0},
+          {"Rh", {rh}},
+          {"Th", {th}},
+          {"poses", {poses}},
+          {"expression", {expression}},
+          {"shapes", {shapes}}};
 }
 
 std::vector<std::byte> pickled_float(double value) {
   std::vector<std::byte> bytes{std::byte{0x80}, std::byte{3}, std::byte{'G'}};
   const uint64_t bits = std::bit_cast<uint64_t>(value);
-  for (int shift = 56; shift >= 0; shift -= 8) bytes.push_back(static_cast<std::byte>(bits >> shift & 0xff));
+  for (int shift = 56; shift >= 0; shift -= 8)
+    bytes.push_back(static_cast<std::byte>(bits >> shift & 0xff));
   bytes.push_back(std::byte{'.'});
   return bytes;
 }
@@ -130,7 +143,9 @@ const char* to_string(dataset::FrameSplit split) {
   return "";
 }
 
-uint32_t frame_number(size_t frame) { return (static_cast<uint32_t>(frame) + 1) * dataset::kFrameStep; }
+uint32_t frame_number(size_t frame) {
+  return (static_cast<uint32_t>(frame) + 1) * dataset::kFrameStep;
+}
 
 std::string numbered(const char* format, uint32_t number) {
   char text[48];
@@ -140,9 +155,13 @@ std::string numbered(const char* format, uint32_t number) {
 
 }  // namespace
 
-IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& record, const Person& person, const std::vector<RigCamera>& rig,
+IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& record,
+                               const Person& person, const std::vector<RigCamera>& rig,
                                const std::vector<CapturedPose>& sequence)
-    : directory_(std::move(directory)), root_rest_m_(record.root_rest_m), rig_(rig), sequence_(sequence) {
+    : directory_(std::move(directory)),
+      root_rest_m_(record.root_rest_m),
+      rig_(rig),
+      sequence_(sequence) {
   about_["version"] = 1;
   about_["complete"] = false;
   about_["tool"] = record.tool;
@@ -150,8 +169,12 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
   about_["seed"] = record.seed;
   about_["body"] = {{"name", record.body_name}, {"hash", record.body_hash}};
   about_["background"] = "black";
-  about_["units"] = "metres, y up; rotations are quaternions wxyz relative to the parent, rest frames are world-aligned";
-  about_["image"] = {{"width", rig[0].camera.width_px}, {"height", rig[0].camera.height_px}, {"jpeg_quality", kJpegQuality}};
+  about_["units"] =
+      "metres, y up; rotations are quaternions wxyz relative to the parent, rest frames are "
+      "world-aligned";
+  about_["image"] = {{"width", rig[0].camera.width_px},
+                     {"height", rig[0].camera.height_px},
+                     {"jpeg_quality", kJpegQuality}};
   about_["shape"] = decimals(person.shape);
   about_["shape_error_m"] = decimal(static_cast<float>(person.shape_error_m));
   ordered_json description = ordered_json::object();
@@ -164,7 +187,8 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
                       {"excluded_skins", record.limits.excluded_skins},
                       {"hair", record.limits.hair}};
   about_["sources"] = record.sources;
-  const dataset::Split split = dataset::default_split(static_cast<uint32_t>(sequence.size()), static_cast<uint32_t>(rig.size()));
+  const dataset::Split split = dataset::default_split(static_cast<uint32_t>(sequence.size()),
+                                                      static_cast<uint32_t>(rig.size()));
   about_["held_out_cameras"] = ordered_json::array();
   for (size_t c = 0; c < rig.size(); ++c) {
     if (split.held_out_camera[c]) about_["held_out_cameras"].push_back(rig[c].name);
@@ -184,11 +208,13 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
 }
 
 std::string IdentityLayout::image_path(size_t frame, size_t camera) const {
-  return directory_ + "/images_lr/" + rig_[camera].name + "/" + numbered("%04u_img.jpg", frame_number(frame));
+  return directory_ + "/images_lr/" + rig_[camera].name + "/" +
+         numbered("%04u_img.jpg", frame_number(frame));
 }
 
 std::string IdentityLayout::mask_path(size_t frame, size_t camera) const {
-  return directory_ + "/fmask_lr/" + rig_[camera].name + "/" + numbered("%04u_img_fmask.png", frame_number(frame));
+  return directory_ + "/fmask_lr/" + rig_[camera].name + "/" +
+         numbered("%04u_img_fmask.png", frame_number(frame));
 }
 
 void IdentityLayout::write_json(const std::string& path, const ordered_json& value) const {
@@ -199,7 +225,9 @@ void IdentityLayout::write_json(const std::string& path, const ordered_json& val
 void IdentityLayout::begin(bool resume) {
   const std::string about_path = directory_ + "/figurine.json";
   if (fs::exists(about_path)) {
-    if (!resume) throw InputError(directory_ + ": holds a capture already; --resume goes on with it, or choose another -o");
+    if (!resume)
+      throw InputError(directory_ +
+                       ": holds a capture already; --resume goes on with it, or choose another -o");
     const ports::MappedFile file = value_or_throw(ports::MappedFile::open(about_path), about_path);
     const auto* text = reinterpret_cast<const char*>(file.bytes().data());
     ordered_json found = ordered_json::parse(text, text + file.bytes().size(), nullptr, false);
@@ -207,7 +235,8 @@ void IdentityLayout::begin(bool resume) {
     found["complete"] = false;
     // Compared as text: what was read has become doubles, as what is to be written will.
     if (found.dump() != about_.dump())
-      throw InputError(about_path + ": is of a capture with other settings; --resume needs the same command");
+      throw InputError(about_path +
+                       ": is of a capture with other settings; --resume needs the same command");
   }
   std::error_code error;
   for (const RigCamera& entry : rig_) {
@@ -237,15 +266,19 @@ void IdentityLayout::begin(bool resume) {
   }
   write_json(directory_ + "/camera_extrinsics.json", extrinsics);
   const Camera& one = rig_[0].camera;  // the rig's cameras share their intrinsics
-  const double fx = 2 * decimal(one.fx_px), fy = 2 * decimal(one.fy_px), cx = 2 * decimal(one.cx_px), cy = 2 * decimal(one.cy_px);
+  const double fx = 2 * decimal(one.fx_px), fy = 2 * decimal(one.fy_px),
+               cx = 2 * decimal(one.cx_px), cy = 2 * decimal(one.cy_px);
   write_json(directory_ + "/camera_intrinsics.json",
-             {{"intrinsics", {{fx, 0.0, cx}, {0.0, fy, cy}, {0.0, 0.0, 1.0}}}, {"dist", ordered_json::array()}});
+             {{"intrinsics", {{fx, 0.0, cx}, {0.0, fy, cy}, {0.0, 0.0, 1.0}}},
+              {"dist", ordered_json::array()}});
   write_bytes(directory_ + "/camera_scale.pkl", pickled_float(kCameraScale));
   std::vector<float> shape;
   for (const ordered_json& s : about_["shape"]) shape.push_back(s.get<float>());
   for (size_t f = 0; f < sequence_.size(); ++f) {
-    const std::string text = ordered_json::array({smplx_person(sequence_[f], shape, root_rest_m_)}).dump() + "\n";
-    write_unsynced(directory_ + "/smplx/smpl/" + numbered("%06u.json", static_cast<uint32_t>(f)), std::as_bytes(std::span(text)));
+    const std::string text =
+        ordered_json::array({smplx_person(sequence_[f], shape, root_rest_m_)}).dump() + "\n";
+    write_unsynced(directory_ + "/smplx/smpl/" + numbered("%06u.json", static_cast<uint32_t>(f)),
+                   std::as_bytes(std::span(text)));
   }
   write_json(about_path, about_);
 }
@@ -256,7 +289,8 @@ bool IdentityLayout::has_image(size_t frame, size_t camera) const {
 
 void IdentityLayout::write_image(size_t frame, size_t camera, const Rendering& rendering) const {
   write_unsynced(image_path(frame, camera), dataset::encode_jpeg(rendering.colour, kJpegQuality));
-  write_unsynced(mask_path(frame, camera), value_or_throw(ports::encode_png(rendering.alpha), mask_path(frame, camera)));
+  write_unsynced(mask_path(frame, camera),
+                 value_or_throw(ports::encode_png(rendering.alpha), mask_path(frame, camera)));
 }
 
 void IdentityLayout::finish() const {

@@ -1,5 +1,5 @@
-// Writes one identity in MVHumanNet's layout, so that the one reader (toolchain/dataset) serves real and synthetic captures alike
-// (docs/capture.md).
+// Writes one identity in MVHumanNet's layout, so that the one reader (toolchain/dataset) serves
+// real and synthetic captures alike (docs/capture.md).
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -30,9 +30,10 @@ struct IdentityRecord {
 
 class IdentityLayout {
  public:
-  // directory is made if it is not there. InputError if it holds a capture of another request, or one at all without `resume`.
-  IdentityLayout(std::string directory, const IdentityRecord& record, const Person& person, const std::vector<RigCamera>& rig,
-                 const std::vector<CapturedPose>& sequence);
+  // directory is made if it is not there. InputError if it holds a capture of another request, or
+  // one at all without `resume`.
+  IdentityLayout(std::string directory, const IdentityRecord& record, const Person& person,
+                 const std::vector<RigCamera>& rig, const std::vector<CapturedPose>& sequence);
 
   // Cameras, poses and figurine.json (complete: false), as far as not there yet.
   void begin(bool resume);

@@ -24,13 +24,15 @@ struct Material {
 // How a cloth folds.
 struct FoldStyle {
   float wavelength_m = 0.03f;  // from fold to fold, mean
-  float slack = 0.015f;        // share by which the cloth is cut longer than what it covers: it gathers where it hangs
-  float strength = 1;          // 0: does not fold
+  float slack = 0.015f;  // share by which the cloth is cut longer than what it covers: it gathers
+                         // where it hangs
+  float strength = 1;    // 0: does not fold
 };
 
 class FoldPattern;
 
-// Rest pose; letters as in body/surface.h. Vertices are shared across texture seams, so that normals are smooth there.
+// Rest pose; letters as in body/surface.h. Vertices are shared across texture seams, so that
+// normals are smooth there.
 struct Mesh {
   std::string name;
   std::vector<float> position_m;       // [V,3]
@@ -49,9 +51,10 @@ struct Mesh {
 
 struct Person {
   std::vector<Mesh> meshes;
-  std::vector<float> shape;                                      // [S] coefficients of the body package nearest to this person
-  double shape_error_m = 0;                                      // mean distance of the person's texels to what the coefficients give
-  std::vector<std::pair<std::string, std::string>> description;  // "outfit" -> "male_casualsuit03", ...
+  std::vector<float> shape;  // [S] coefficients of the body package nearest to this person
+  double shape_error_m = 0;  // mean distance of the person's texels to what the coefficients give
+  std::vector<std::pair<std::string, std::string>>
+      description;  // "outfit" -> "male_casualsuit03", ...
 };
 
 }  // namespace figurine::capture

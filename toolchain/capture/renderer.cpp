@@ -22,12 +22,14 @@ constexpr float kOpaque = 0.985f;    // alpha from which nothing behind is looke
 constexpr float kInvisible = 0.02f;  // alpha below which a hit is passed over
 constexpr int kAmbientDirections = 64;
 constexpr float kAmbientReach_m = 1.5f;
-constexpr float kFoldShade = 2.5f;        // share of the sky that a fold as high as its wavelength would win or lose
+constexpr float kFoldShade =
+    2.5f;  // share of the sky that a fold as high as its wavelength would win or lose
 constexpr float kSurfaceGap_m = 0.0008f;  // ray origins are lifted by this
 constexpr unsigned kAllMask = ~0u, kShadowMask = 2u, kVisibleMask = 1u;
 
-// Eight samples with distinct sixteenths on both axes and in the light's disc: the standard 8-sample rotated pattern. The same for every
-// pixel: a fixed pattern leaves no noise in reference images.
+// Eight samples with distinct sixteenths on both axes and in the light's disc: the standard
+// 8-sample rotated pattern. The same for every pixel: a fixed pattern leaves no noise in reference
+// images.
 constexpr std::array<std::array<float, 2>, kLanes> kPixelPattern = {{{9.f / 16, 5.f / 16},
                                                                      {7.f / 16, 11.f / 16},
                                                                      {13.f / 16, 9.f / 16},
@@ -37,8 +39,9 @@ constexpr std::array<std::array<float, 2>, kLanes> kPixelPattern = {{{9.f / 16, 
                                                                      {11.f / 16, 15.f / 16},
                                                                      {15.f / 16, 1.f / 16}}};
 
-// In the middle of an opaque surface, where all eight hits are neighbours, four of them are shaded and stand for two each: a rotated grid
-// of their own (the sample at the other end of the arrow is the nearest). Outlines, hair and steep surfaces keep all eight.
+// In the middle of an opaque surface, where all eight hits are neighbours, four of them are shaded
+// and stand for two each: a rotated grid of their own (the sample at the other end of the arrow is
+// the nearest). Outlines, hair and steep surfaces keep all eight.
 constexpr std::array<int, kLanes> kStandsFor = {2, 6, 2, 3, 5, 5, 6, 3};
 constexpr float kNeighbours = 3;  // depths within a pixel, in pixel widths
 
@@ -46,7 +49,8 @@ constexpr float kNeighbours = 3;  // depths within a pixel, in pixel widths
 std::array<std::array<float, 2>, kLanes> light_pattern() {
   std::array<std::array<float, 2>, kLanes> out;
   for (int i = 0; i < kLanes; ++i) {
-    const float r = std::sqrt((static_cast<float>(i) + 0.5f) / kLanes), angle = 2.3999632f * static_cast<float>(i);
+    const float r = std::sqrt((static_cast<float>(i) + 0.5f) / kLanes),
+                angle = 2.3999632f * static_cast<float>(i);
     out[i] = {r * std::cos(angle), r * std::sin(angle)};
   }
   return out;
@@ -56,14 +60,16 @@ std::array<std::array<float, 2>, kLanes> light_pattern() {
 std::array<Vec3, kAmbientDirections> sphere_directions() {
   std::array<Vec3, kAmbientDirections> out;
   for (int i = 0; i < kAmbientDirections; ++i) {
-    const float y = 1 - 2 * (static_cast<float>(i) + 0.5f) / kAmbientDirections, r = std::sqrt(1 - y * y);
+    const float y = 1 - 2 * (static_cast<float>(i) + 0.5f) / kAmbientDirections,
+                r = std::sqrt(1 - y * y);
     const float angle = 2.3999632f * static_cast<float>(i);
     out[i] = {r * std::cos(angle), y, r * std::sin(angle)};
   }
   return out;
 }
 
-// sRGB encoding by a table over the square root, where the curve is nearly straight: error below 1e-5 away from black.
+// sRGB encoding by a table over the square root, where the curve is nearly straight: error below
+// 1e-5 away from black.
 class Encoder {
  public:
   Encoder() {
@@ -88,11 +94,12 @@ struct PosedMesh {
   std::vector<float> position, normal, ambient;  // [V,3]
   std::vector<uint8_t> used;                     // [V] whether a triangle has it
   std::vector<float> texels_per_m;               // [F] of the colour texture
-  std::vector<FoldSample> folds;                 // of the mesh' fold pattern in this pose, world; empty: none
+  std::vector<FoldSample> folds;  // of the mesh' fold pattern in this pose, world; empty: none
   std::array<float, 2> uv(uint32_t triangle, float b1, float b2) const {
     const uint32_t* t = &mesh->uv_triangles[size_t{triangle} * 3];
     const float b0 = 1 - b1 - b2;
-    const float *p0 = &mesh->uv[size_t{t[0]} * 2], *p1 = &mesh->uv[size_t{t[1]} * 2], *p2 = &mesh->uv[size_t{t[2]} * 2];
+    const float *p0 = &mesh->uv[size_t{t[0]} * 2], *p1 = &mesh->uv[size_t{t[1]} * 2],
+                *p2 = &mesh->uv[size_t{t[2]} * 2];
     return {b0 * p0[0] + b1 * p1[0] + b2 * p2[0], b0 * p0[1] + b1 * p1[1] + b2 * p2[1]};
   }
 };
@@ -113,7 +120,8 @@ void skip_transparent(const RTCFilterFunctionNArguments* a) {
   const auto& posed = *static_cast<const PosedMesh*>(a->geometryUserPtr);
   for (unsigned i = 0; i < a->N; ++i) {
     if (a->valid[i] != -1) continue;
-    if (alpha_at(posed, RTCHitN_primID(a->hit, a->N, i), RTCHitN_u(a->hit, a->N, i), RTCHitN_v(a->hit, a->N, i)) < kInvisible)
+    if (alpha_at(posed, RTCHitN_primID(a->hit, a->N, i), RTCHitN_u(a->hit, a->N, i),
+                 RTCHitN_v(a->hit, a->N, i)) < kInvisible)
       a->valid[i] = 0;
   }
 }
@@ -125,23 +133,29 @@ void fade_shadow(const RTCFilterFunctionNArguments* a) {
   for (unsigned i = 0; i < a->N; ++i) {
     if (a->valid[i] != -1) continue;
     float& left = context->transmittance[RTCRayN_id(a->ray, a->N, i)];
-    left *= 1 - alpha_at(posed, RTCHitN_primID(a->hit, a->N, i), RTCHitN_u(a->hit, a->N, i), RTCHitN_v(a->hit, a->N, i));
+    left *= 1 - alpha_at(posed, RTCHitN_primID(a->hit, a->N, i), RTCHitN_u(a->hit, a->N, i),
+                         RTCHitN_v(a->hit, a->N, i));
     if (left > 0.02f) a->valid[i] = 0;
   }
 }
 
-// Texels a metre of every triangle, for choosing the texture's level. Measured in the rest pose: skinning hardly stretches.
+// Texels a metre of every triangle, for choosing the texture's level. Measured in the rest pose:
+// skinning hardly stretches.
 std::vector<float> texel_density(const Mesh& mesh) {
   std::vector<float> out(mesh.triangle_count());
   const Texture& texture = *mesh.material.colour;
-  const auto w = static_cast<float>(texture.width_px()), h = static_cast<float>(texture.height_px());
+  const auto w = static_cast<float>(texture.width_px()),
+             h = static_cast<float>(texture.height_px());
   for (uint32_t f = 0; f < mesh.triangle_count(); ++f) {
     const uint32_t *t = &mesh.triangles[size_t{f} * 3], *s = &mesh.uv_triangles[size_t{f} * 3];
-    const Vec3 p0 = load(&mesh.position_m[size_t{t[0]} * 3]), p1 = load(&mesh.position_m[size_t{t[1]} * 3]),
+    const Vec3 p0 = load(&mesh.position_m[size_t{t[0]} * 3]),
+               p1 = load(&mesh.position_m[size_t{t[1]} * 3]),
                p2 = load(&mesh.position_m[size_t{t[2]} * 3]);
     const float area = length(cross(p1 - p0, p2 - p0));
     const auto uv = [&](int c, int i) { return mesh.uv[size_t{s[c]} * 2 + i]; };
-    const float texels = std::fabs((uv(1, 0) - uv(0, 0)) * (uv(2, 1) - uv(0, 1)) - (uv(1, 1) - uv(0, 1)) * (uv(2, 0) - uv(0, 0))) * w * h;
+    const float texels = std::fabs((uv(1, 0) - uv(0, 0)) * (uv(2, 1) - uv(0, 1)) -
+                                   (uv(1, 1) - uv(0, 1)) * (uv(2, 0) - uv(0, 0))) *
+                         w * h;
     out[f] = area > 1e-12f ? std::sqrt(texels / area) : 1.0f;
   }
   return out;
@@ -151,14 +165,19 @@ std::vector<float> texel_density(const Mesh& mesh) {
 std::vector<float> linear_parts(const Mesh& mesh, std::span<const Affine> world_from_rest) {
   std::vector<float> out(size_t{mesh.vertex_count()} * 9);
   for (size_t v = 0; v < mesh.vertex_count(); ++v) {
-    const Affine transform = blend(world_from_rest, &mesh.skin_joints[v * kSkinInfluences], &mesh.skin_weights[v * kSkinInfluences]);
-    for (size_t row = 0; row < 3; ++row) std::copy_n(&transform.m[row * 4], 3, &out[v * 9 + row * 3]);
+    const Affine transform = blend(world_from_rest, &mesh.skin_joints[v * kSkinInfluences],
+                                   &mesh.skin_weights[v * kSkinInfluences]);
+    for (size_t row = 0; row < 3; ++row)
+      std::copy_n(&transform.m[row * 4], 3, &out[v * 9 + row * 3]);
   }
   return out;
 }
 
-// Light gathered at the coarse vertices knows nothing of folds: hollows see less of the sky than ridges do.
-float fold_openness(float height_m, float wavelength_m) { return std::clamp(1 + kFoldShade * height_m / wavelength_m, 0.6f, 1.1f); }
+// Light gathered at the coarse vertices knows nothing of folds: hollows see less of the sky than
+// ridges do.
+float fold_openness(float height_m, float wavelength_m) {
+  return std::clamp(1 + kFoldShade * height_m / wavelength_m, 0.6f, 1.1f);
+}
 
 }  // namespace
 
@@ -182,12 +201,14 @@ struct Renderer::Scene {
   };
   Surface surface(const RTCRayHit8& hits, int lane, float pixel_angle) const;
   bool is_interior(const RTCRayHit8& hits, float pixel_angle) const;
-  void trace_pixel(const Camera& camera, uint32_t px, uint32_t py, Vec3 eye, const float* rotation, float pixel_angle, float* out) const;
+  void trace_pixel(const Camera& camera, uint32_t px, uint32_t py, Vec3 eye, const float* rotation,
+                   float pixel_angle, float* out) const;
 };
 
 Renderer::Renderer(const Person& person, FoldMode folds) : scene_(std::make_unique<Scene>()) {
   scene_->fold_mode = folds;
-  // One thread: several renderers run side by side. One instruction set, so that the same bytes come from CPUs with and without AVX-512.
+  // One thread: several renderers run side by side. One instruction set, so that the same bytes
+  // come from CPUs with and without AVX-512.
   scene_->device = rtcNewDevice("threads=1,isa=avx2");
   FIG_CHECK(scene_->device != nullptr, "Embree gives a device");
   const Vec3 l = scene_->lighting.key_direction;
@@ -209,9 +230,11 @@ Renderer::~Renderer() {
 }
 
 void Renderer::set_pose(std::span<const Affine> world_from_rest) {
-  _mm_setcsr(_mm_getcsr() | 0x8040);  // flush denormals, as Embree asks of every thread that renders
+  _mm_setcsr(_mm_getcsr() |
+             0x8040);  // flush denormals, as Embree asks of every thread that renders
   for (PosedMesh& posed : scene_->meshes) {
-    posed.position = body::skin_positions(posed.mesh->position_m, posed.mesh->skin_joints, posed.mesh->skin_weights, world_from_rest);
+    posed.position = body::skin_positions(posed.mesh->position_m, posed.mesh->skin_joints,
+                                          posed.mesh->skin_weights, world_from_rest);
     posed.normal = body::vertex_normals(posed.position, posed.mesh->triangles);
     if (posed.mesh->folds != nullptr && scene_->fold_mode != FoldMode::kOff) {
       const bool rest = scene_->fold_mode == FoldMode::kRest;
@@ -226,16 +249,21 @@ void Renderer::set_pose(std::span<const Affine> world_from_rest) {
 void Renderer::Scene::build() {
   if (scene != nullptr) rtcReleaseScene(scene);
   scene = rtcNewScene(device);
-  rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);  // no spatial splits: a filter must see every triangle once
+  rtcSetSceneBuildQuality(
+      scene, RTC_BUILD_QUALITY_MEDIUM);  // no spatial splits: a filter must see every triangle once
   for (size_t m = 0; m < meshes.size(); ++m) {
     PosedMesh& posed = meshes[m];
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, posed.position.size() / 3);
+    void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                             12, posed.position.size() / 3);
     std::memcpy(vertices, posed.position.data(), posed.position.size() * sizeof(float));
-    void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, posed.mesh->triangle_count());
-    std::memcpy(triangles, posed.mesh->triangles.data(), posed.mesh->triangles.size() * sizeof(uint32_t));
+    void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                              12, posed.mesh->triangle_count());
+    std::memcpy(triangles, posed.mesh->triangles.data(),
+                posed.mesh->triangles.size() * sizeof(uint32_t));
     rtcSetGeometryUserData(geometry, &posed);
-    rtcSetGeometryMask(geometry, kVisibleMask | (posed.mesh->material.casts_shadow ? kShadowMask : 0));
+    rtcSetGeometryMask(geometry,
+                       kVisibleMask | (posed.mesh->material.casts_shadow ? kShadowMask : 0));
     if (posed.mesh->material.colour->has_alpha()) {
       rtcSetGeometryIntersectFilterFunction(geometry, skip_transparent);
       rtcSetGeometryOccludedFilterFunction(geometry, fade_shadow);
@@ -250,8 +278,8 @@ void Renderer::Scene::build() {
 namespace {
 
 // How much of each ray's way is free: 1 nothing there, 0 blocked.
-void trace_shadows(RTCScene scene, const Vec3* origin, const Vec3* direction, const int* valid, float reach, bool coherent,
-                   float* visible) {
+void trace_shadows(RTCScene scene, const Vec3* origin, const Vec3* direction, const int* valid,
+                   float reach, bool coherent, float* visible) {
   alignas(32) RTCRay8 rays;
   alignas(32) int active[kLanes];
   ShadowContext context;
@@ -309,32 +337,39 @@ void Renderer::Scene::gather_ambient() {
       }
       if (filled != 0) flush();
       if (weight_sum > 0) sum = sum * (1 / weight_sum);
-      posed.ambient[v * 3] = sum.x, posed.ambient[v * 3 + 1] = sum.y, posed.ambient[v * 3 + 2] = sum.z;
+      posed.ambient[v * 3] = sum.x, posed.ambient[v * 3 + 1] = sum.y,
+                        posed.ambient[v * 3 + 2] = sum.z;
     }
   }
 }
 
-Renderer::Scene::Surface Renderer::Scene::surface(const RTCRayHit8& hits, int lane, float pixel_angle) const {
+Renderer::Scene::Surface Renderer::Scene::surface(const RTCRayHit8& hits, int lane,
+                                                  float pixel_angle) const {
   const PosedMesh& posed = meshes[hits.hit.geomID[lane]];
   const Mesh& mesh = *posed.mesh;
   const uint32_t triangle = hits.hit.primID[lane];
   const float b1 = hits.hit.u[lane], b2 = hits.hit.v[lane], b0 = 1 - b1 - b2;
   const uint32_t* t = &mesh.triangles[size_t{triangle} * 3];
-  const Vec3 p[3] = {load(&posed.position[size_t{t[0]} * 3]), load(&posed.position[size_t{t[1]} * 3]),
+  const Vec3 p[3] = {load(&posed.position[size_t{t[0]} * 3]),
+                     load(&posed.position[size_t{t[1]} * 3]),
                      load(&posed.position[size_t{t[2]} * 3])};
-  const Vec3 n[3] = {load(&posed.normal[size_t{t[0]} * 3]), load(&posed.normal[size_t{t[1]} * 3]), load(&posed.normal[size_t{t[2]} * 3])};
+  const Vec3 n[3] = {load(&posed.normal[size_t{t[0]} * 3]), load(&posed.normal[size_t{t[1]} * 3]),
+                     load(&posed.normal[size_t{t[2]} * 3])};
   const Vec3 a[3] = {load(&posed.ambient[size_t{t[0]} * 3]), load(&posed.ambient[size_t{t[1]} * 3]),
                      load(&posed.ambient[size_t{t[2]} * 3])};
-  const Vec3 to_view = normalized(-Vec3{hits.ray.dir_x[lane], hits.ray.dir_y[lane], hits.ray.dir_z[lane]});
+  const Vec3 to_view =
+      normalized(-Vec3{hits.ray.dir_x[lane], hits.ray.dir_y[lane], hits.ray.dir_z[lane]});
 
   const std::array<float, 2> uv = posed.uv(triangle, b1, b2);
   const float footprint_m = hits.ray.tfar[lane] * pixel_angle;
-  const float level = std::log2(std::max(posed.texels_per_m[triangle] * footprint_m, 1e-6f)) - 1;  // at least four samples share the pixel
+  const float level = std::log2(std::max(posed.texels_per_m[triangle] * footprint_m, 1e-6f)) -
+                      1;  // at least four samples share the pixel
   const Rgba texel = mesh.material.colour->sample(uv[0], uv[1], level);
 
   Surface out;
   out.alpha = texel.alpha;
-  out.point.albedo = (texel.alpha > 0 ? texel.colour * (1 / texel.alpha) : texel.colour) * mesh.material.tint;
+  out.point.albedo =
+      (texel.alpha > 0 ? texel.colour * (1 / texel.alpha) : texel.colour) * mesh.material.tint;
   out.point.to_view = to_view;
   out.point.surfacing = mesh.material.surfacing;
   out.point.ambient = a[0] * b0 + a[1] * b1 + a[2] * b2;
@@ -343,14 +378,16 @@ Renderer::Scene::Surface Renderer::Scene::surface(const RTCRayHit8& hits, int la
   Vec3 normal = normalized(n[0] * b0 + n[1] * b1 + n[2] * b2);
   if (!posed.folds.empty()) {
     const FoldSample fold = mesh.folds->at(posed.folds, triangle, b1, b2);
-    out.point.ambient = out.point.ambient * fold_openness(fold.height_m, mesh.folds->wavelength_m());
+    out.point.ambient =
+        out.point.ambient * fold_openness(fold.height_m, mesh.folds->wavelength_m());
     normal = normalized(normal - (fold.gradient - normal * dot(fold.gradient, normal)));
   }
   if (mesh.material.normal) {
     // Tangents from the texture coordinates; v is down, normal maps have green up.
     const uint32_t* s = &mesh.uv_triangles[size_t{triangle} * 3];
     const auto c = [&](int corner, int i) { return mesh.uv[size_t{s[corner]} * 2 + i]; };
-    const float du1 = c(1, 0) - c(0, 0), dv1 = c(1, 1) - c(0, 1), du2 = c(2, 0) - c(0, 0), dv2 = c(2, 1) - c(0, 1);
+    const float du1 = c(1, 0) - c(0, 0), dv1 = c(1, 1) - c(0, 1), du2 = c(2, 0) - c(0, 0),
+                dv2 = c(2, 1) - c(0, 1);
     const float determinant = du1 * dv2 - du2 * dv1;
     if (std::fabs(determinant) > 1e-12f) {
       const Vec3 e1 = p[1] - p[0], e2 = p[2] - p[0];
@@ -371,7 +408,8 @@ Renderer::Scene::Surface Renderer::Scene::surface(const RTCRayHit8& hits, int la
   }
   out.point.normal = normal;
 
-  // Hanika's lift: the shadow ray starts above the smooth surface that the vertex normals pretend, not on the flat triangle.
+  // Hanika's lift: the shadow ray starts above the smooth surface that the vertex normals pretend,
+  // not on the flat triangle.
   const Vec3 position = p[0] * b0 + p[1] * b1 + p[2] * b2;
   const float b[3] = {b0, b1, b2};
   Vec3 lifted = position;
@@ -385,7 +423,8 @@ Renderer::Scene::Surface Renderer::Scene::surface(const RTCRayHit8& hits, int la
 
 bool Renderer::Scene::is_interior(const RTCRayHit8& hits, float pixel_angle) const {
   const unsigned mesh = hits.hit.geomID[0];
-  if (mesh == RTC_INVALID_GEOMETRY_ID || meshes[mesh].mesh->material.surfacing == Surfacing::kHair) return false;
+  if (mesh == RTC_INVALID_GEOMETRY_ID || meshes[mesh].mesh->material.surfacing == Surfacing::kHair)
+    return false;
   float near = hits.ray.tfar[0], far = near;
   for (int i = 1; i < kLanes; ++i) {
     if (hits.hit.geomID[i] != mesh) return false;
@@ -395,8 +434,8 @@ bool Renderer::Scene::is_interior(const RTCRayHit8& hits, float pixel_angle) con
   return far - near < kNeighbours * near * pixel_angle;
 }
 
-void Renderer::Scene::trace_pixel(const Camera& camera, uint32_t px, uint32_t py, Vec3 eye, const float* rotation, float pixel_angle,
-                                  float* out) const {
+void Renderer::Scene::trace_pixel(const Camera& camera, uint32_t px, uint32_t py, Vec3 eye,
+                                  const float* rotation, float pixel_angle, float* out) const {
   alignas(32) RTCRayHit8 hits;
   alignas(32) int active[kLanes];
   for (int i = 0; i < kLanes; ++i) {
@@ -441,23 +480,30 @@ void Renderer::Scene::trace_pixel(const Camera& camera, uint32_t px, uint32_t py
       any_hit = true;
       surfaces[i] = surface(hits, i, pixel_angle);
       origin[i] = surfaces[i].shadow_origin;
-      // Wrapped light reaches past the terminator, where a ray towards the light would start inside: it goes along the horizon instead.
+      // Wrapped light reaches past the terminator, where a ray towards the light would start
+      // inside: it goes along the horizon instead.
       const Vec3 normal = surfaces[i].point.normal;
-      const float nl = dot(normal, lighting.key_direction), wrap = wrap_of(surfaces[i].point.surfacing).x;
+      const float nl = dot(normal, lighting.key_direction),
+                  wrap = wrap_of(surfaces[i].point.surfacing).x;
       if (nl <= -wrap) continue;
-      const Vec3 towards = lighting.key_direction + (key_u * light_points[i][0] + key_v * light_points[i][1]) * lighting.key_radius;
+      const Vec3 towards =
+          lighting.key_direction +
+          (key_u * light_points[i][0] + key_v * light_points[i][1]) * lighting.key_radius;
       direction[i] = normalized(nl < 0.05f ? towards + normal * (0.05f - nl) : towards);
       wants_light[i] = -1;
       any_light = true;
     }
     if (!any_hit) break;
     float visible[kLanes] = {0};
-    if (any_light) trace_shadows(scene, origin, direction, wants_light, std::numeric_limits<float>::infinity(), true, visible);
+    if (any_light)
+      trace_shadows(scene, origin, direction, wants_light, std::numeric_limits<float>::infinity(),
+                    true, visible);
     bool any_left = false;
     for (int i = 0; i < kLanes; ++i) {
       if (active[i] == 0) continue;
       const float alpha = surfaces[i].alpha >= kOpaque ? 1.0f : surfaces[i].alpha;
-      colour[i] += shade(lighting, surfaces[i].point, wants_light[i] != 0 ? visible[i] : 0) * (through[i] * alpha);
+      colour[i] += shade(lighting, surfaces[i].point, wants_light[i] != 0 ? visible[i] : 0) *
+                   (through[i] * alpha);
       through[i] *= 1 - alpha;
       if (through[i] < kInvisible) {
         through[i] = 0;
@@ -472,7 +518,8 @@ void Renderer::Scene::trace_pixel(const Camera& camera, uint32_t px, uint32_t py
     if (!any_left) break;
   }
   if (interior) {
-    for (int i = 0; i < kLanes; ++i) colour[i] = colour[kStandsFor[i]], through[i] = through[kStandsFor[i]];
+    for (int i = 0; i < kLanes; ++i)
+      colour[i] = colour[kStandsFor[i]], through[i] = through[kStandsFor[i]];
   }
   // Encoded first, averaged after: images are blended as stored (docs/numerics.md).
   Vec3 sum;
@@ -481,10 +528,13 @@ void Renderer::Scene::trace_pixel(const Camera& camera, uint32_t px, uint32_t py
     const float alpha = 1 - through[i];
     if (alpha <= 0) continue;
     const Vec3 straight = colour[i] * (1 / alpha);
-    sum += Vec3{encode(shoulder(straight.x)), encode(shoulder(straight.y)), encode(shoulder(straight.z))} * alpha;
+    sum += Vec3{encode(shoulder(straight.x)), encode(shoulder(straight.y)),
+                encode(shoulder(straight.z))} *
+           alpha;
     alpha_sum += alpha;
   }
-  out[0] = sum.x / kLanes, out[1] = sum.y / kLanes, out[2] = sum.z / kLanes, out[3] = alpha_sum / kLanes;
+  out[0] = sum.x / kLanes, out[1] = sum.y / kLanes, out[2] = sum.z / kLanes,
+  out[3] = alpha_sum / kLanes;
 }
 
 Renderer::Bounds Renderer::bounds() const {
@@ -506,8 +556,10 @@ Rendering Renderer::render(const Camera& camera) const {
   FIG_CHECK(validate_camera(camera).ok(), "a valid camera");
   _mm_setcsr(_mm_getcsr() | 0x8040);
   const float* m = camera.view_from_world.data();
-  const float width = static_cast<float>(camera.width_px), height = static_cast<float>(camera.height_px);
-  // Only pixels inside the figure's projected box are traced. A vertex behind the camera widens it to the whole image.
+  const float width = static_cast<float>(camera.width_px),
+              height = static_cast<float>(camera.height_px);
+  // Only pixels inside the figure's projected box are traced. A vertex behind the camera widens it
+  // to the whole image.
   float left = width, top = height, right = 0, bottom = 0;
   for (const PosedMesh& posed : scene_->meshes) {
     for (size_t v = 0; v < posed.used.size(); ++v) {
@@ -518,19 +570,26 @@ Rendering Renderer::render(const Camera& camera) const {
         left = top = 0, right = width, bottom = height;
         continue;
       }
-      const float x = camera.fx_px * (m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3]) / z + camera.cx_px;
-      const float y = camera.fy_px * (m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7]) / z + camera.cy_px;
-      left = std::min(left, x), right = std::max(right, x), top = std::min(top, y), bottom = std::max(bottom, y);
+      const float x =
+          camera.fx_px * (m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3]) / z + camera.cx_px;
+      const float y =
+          camera.fy_px * (m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7]) / z + camera.cy_px;
+      left = std::min(left, x), right = std::max(right, x), top = std::min(top, y),
+      bottom = std::max(bottom, y);
     }
   }
-  const auto clip = [](float x, float size) { return static_cast<uint32_t>(std::clamp(x, 0.0f, size)); };
+  const auto clip = [](float x, float size) {
+    return static_cast<uint32_t>(std::clamp(x, 0.0f, size));
+  };
   const uint32_t x0 = clip(std::floor(left), width), x1 = clip(std::ceil(right) + 1, width);
   const uint32_t y0 = clip(std::floor(top), height), y1 = clip(std::ceil(bottom) + 1, height);
 
   // The eye is where the view vector is zero: -R^T t.
-  const Vec3 eye{-(m[0] * m[3] + m[4] * m[7] + m[8] * m[11]), -(m[1] * m[3] + m[5] * m[7] + m[9] * m[11]),
+  const Vec3 eye{-(m[0] * m[3] + m[4] * m[7] + m[8] * m[11]),
+                 -(m[1] * m[3] + m[5] * m[7] + m[9] * m[11]),
                  -(m[2] * m[3] + m[6] * m[7] + m[10] * m[11])};
-  Rendering out{ports::ImageU8(camera.width_px, camera.height_px, 3), ports::ImageU8(camera.width_px, camera.height_px, 1)};
+  Rendering out{ports::ImageU8(camera.width_px, camera.height_px, 3),
+                ports::ImageU8(camera.width_px, camera.height_px, 1)};
   const auto byte = [](float x) { return static_cast<uint8_t>(std::min(255.0f, x * 255 + 0.5f)); };
   for (uint32_t y = y0; y < y1; ++y) {
     for (uint32_t x = x0; x < x1; ++x) {

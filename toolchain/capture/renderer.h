@@ -1,11 +1,15 @@
-// Renders a posed person by ray tracing: a key light with cast shadows, a sky with ambient occlusion, a weak fill, all fixed in the world.
+// Renders a posed person by ray tracing: a key light with cast shadows, a sky with ambient
+// occlusion, a weak fill, all fixed in the world.
 //
-// What it is: reference photographs for training, so no noise (every random choice is a fixed pattern), samples averaged as they are stored
-// (sRGB-encoded, premultiplied), soft alpha, layers of transparent hair composited in order. What it is not: global illumination, ground,
-// lens. Ambient light is gathered once per pose at the vertices and shared by all cameras; key-light shadows are traced per sample.
+// What it is: reference photographs for training, so no noise (every random choice is a fixed
+// pattern), samples averaged as they are stored (sRGB-encoded, premultiplied), soft alpha, layers
+// of transparent hair composited in order. What it is not: global illumination, ground, lens.
+// Ambient light is gathered once per pose at the vertices and shared by all cameras; key-light
+// shadows are traced per sample.
 //
-// Based on: Wald et al., Embree: A Kernel Framework for Efficient CPU Ray Tracing, 2014; Hanika, Hacking the Shadow Terminator, Ray Tracing
-// Gems II, 2021, chapter 4 (origins of shadow rays). Skin's softened terminator is a wrapped cosine, not a measured scattering profile.
+// Based on: Wald et al., Embree: A Kernel Framework for Efficient CPU Ray Tracing, 2014; Hanika,
+// Hacking the Shadow Terminator, Ray Tracing Gems II, 2021, chapter 4 (origins of shadow rays).
+// Skin's softened terminator is a wrapped cosine, not a measured scattering profile.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +38,8 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  // Skins the meshes, builds the acceleration structure and gathers ambient light: about half a second.
+  // Skins the meshes, builds the acceleration structure and gathers ambient light: about half a
+  // second.
   void set_pose(std::span<const Affine> world_from_rest);
   // The posed vertices' bounds, for framing and for leaving out empty pixels.
   struct Bounds {

@@ -13,7 +13,8 @@ namespace {
 constexpr std::array<float, 3> kElevationsDeg = {-9, 13, 36};
 constexpr uint32_t kLeftOutNumber = 41;
 
-// Largest |image coordinate| of a point over all cameras, 1 at the border; a point behind a camera counts as outside.
+// Largest |image coordinate| of a point over all cameras, 1 at the border; a point behind a camera
+// counts as outside.
 float reach(const std::vector<RigCamera>& rig, const std::vector<Vec3>& points) {
   float worst = 0;
   for (const RigCamera& entry : rig) {
@@ -43,16 +44,20 @@ std::vector<RigCamera> make_rig(const RigOptions& options, const std::vector<Vec
     std::vector<RigCamera> rig;
     for (uint32_t i = 0; i < options.views; ++i) {
       const uint32_t ring = i * rings / options.views;
-      const uint32_t first = (ring * options.views + rings - 1) / rings, end = ((ring + 1) * options.views + rings - 1) / rings;
+      const uint32_t first = (ring * options.views + rings - 1) / rings,
+                     end = ((ring + 1) * options.views + rings - 1) / rings;
       const float step = 360.0f / static_cast<float>(end - first);
       OrbitCamera orbit;
-      orbit.azimuth_deg = (static_cast<float>(i - first) + static_cast<float>(ring) / static_cast<float>(rings)) * step;
+      orbit.azimuth_deg =
+          (static_cast<float>(i - first) + static_cast<float>(ring) / static_cast<float>(rings)) *
+          step;
       orbit.elevation_deg = rings == 1 ? kElevationsDeg[1] : kElevationsDeg[ring];
       orbit.distance_m = distance_m;
       orbit.vertical_fov_deg = options.vertical_fov_deg;
       orbit.target_m = {0, (low.y + high.y) / 2, 0};
       RigCamera entry;
-      entry.camera = value_or_throw(make_orbit_camera(orbit, options.width_px, options.height_px), "--views");
+      entry.camera =
+          value_or_throw(make_orbit_camera(orbit, options.width_px, options.height_px), "--views");
       entry.number = i + 1 < kLeftOutNumber ? i + 1 : i + 2;
       char name[16];
       std::snprintf(name, sizeof name, "C%02u", entry.number);

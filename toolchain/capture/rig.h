@@ -19,13 +19,15 @@ struct RigOptions {
 };
 
 struct RigCamera {
-  std::string name;     // "C01", ...
-  uint32_t number = 1;  // as in the extrinsics' keys; never 41, which readers of MVHumanNet leave out
+  std::string name;  // "C01", ...
+  uint32_t number =
+      1;  // as in the extrinsics' keys; never 41, which readers of MVHumanNet leave out
   Camera camera;
 };
 
-// Up to three rings (below, level, above), azimuths staggered from ring to ring. One distance for all: the nearest at which every point of
-// `points` is inside every image with the margin. points: places that the figure reaches in any pose, world, at least one.
+// Up to three rings (below, level, above), azimuths staggered from ring to ring. One distance for
+// all: the nearest at which every point of `points` is inside every image with the margin. points:
+// places that the figure reaches in any pose, world, at least one.
 std::vector<RigCamera> make_rig(const RigOptions& options, const std::vector<Vec3>& points);
 
 }  // namespace figurine::capture

@@ -10,21 +10,25 @@
 namespace figurine::capture {
 namespace {
 
-// Turns from one pose to the next. Not the golden ratio: its multiples of 13 nearly close the circle, so every 13th pose (the held-out
-// ones) would face the same way; 13 times this one does not.
+// Turns from one pose to the next. Not the golden ratio: its multiples of 13 nearly close the
+// circle, so every 13th pose (the held-out ones) would face the same way; 13 times this one does
+// not.
 constexpr double kHeadingStep = 0.4142135623730950;  // sqrt(2) - 1
 constexpr uint64_t kHeadingStream = 3;
 
 }  // namespace
 
-std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& motions, const SequenceOptions& options) {
+std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& motions,
+                                        const SequenceOptions& options) {
   uint32_t total = 0;
   for (const body::MotionClip& motion : motions) total += motion.frame_count;
   if (total < options.frames) {
-    throw InputError("--frames: " + std::to_string(options.frames) + " asked for, the motions have " + std::to_string(total));
+    throw InputError("--frames: " + std::to_string(options.frames) +
+                     " asked for, the motions have " + std::to_string(total));
   }
   const dataset::Split split = dataset::default_split(options.frames, 1);
-  const auto first = std::find(split.frames.begin(), split.frames.end(), dataset::FrameSplit::kBlock);
+  const auto first =
+      std::find(split.frames.begin(), split.frames.end(), dataset::FrameSplit::kBlock);
   const bool has_block = first != split.frames.end();
   const uint32_t spare = total - options.frames;
   const uint32_t distance = has_block ? std::min({kBlockDistance, total / 10, spare / 2}) : 0;
@@ -36,7 +40,9 @@ std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& mot
   bool after_block = false;
   for (uint32_t i = 0; i < options.frames; ++i) {
     const bool in_block = split.frames[i] == dataset::FrameSplit::kBlock;
-    uint32_t at = options.frames > 1 ? static_cast<uint32_t>(uint64_t{i} * (length - 1) / (options.frames - 1)) : 0;
+    uint32_t at = options.frames > 1
+                      ? static_cast<uint32_t>(uint64_t{i} * (length - 1) / (options.frames - 1))
+                      : 0;
     if (in_block) {
       if (!after_block) block_heading = start + i * kHeadingStep;
       after_block = true;

@@ -1,4 +1,5 @@
-// The poses of a capture: frames of motions, spread over their length and over all headings, with a held-out block kept apart.
+// The poses of a capture: frames of motions, spread over their length and over all headings, with a
+// held-out block kept apart.
 #pragma once
 
 #include <array>
@@ -19,8 +20,8 @@ struct CapturedPose {
   float heading_rad = 0;  // turn about the vertical, beside the motion's own
 };
 
-// Frames between the held-out block and the nearest pose outside it, where the motions are long enough (at most a tenth of them on each
-// side).
+// Frames between the held-out block and the nearest pose outside it, where the motions are long
+// enough (at most a tenth of them on each side).
 inline constexpr uint32_t kBlockDistance = 40;
 
 struct SequenceOptions {
@@ -29,9 +30,11 @@ struct SequenceOptions {
   std::array<float, 3> root_rest_m{0, 0, 0};  // of the person's own shape
 };
 
-// The motions are laid end to end and sampled evenly; dataset::default_split says what is held out. Every pose outside the block gets its
-// own heading (irrational steps: any run of poses covers the circle, and so do the held-out ones); the block keeps one, so that it is a
-// piece of real motion. InputError if the motions have fewer frames than asked for.
-std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& motions, const SequenceOptions& options);
+// The motions are laid end to end and sampled evenly; dataset::default_split says what is held out.
+// Every pose outside the block gets its own heading (irrational steps: any run of poses covers the
+// circle, and so do the held-out ones); the block keeps one, so that it is a piece of real motion.
+// InputError if the motions have fewer frames than asked for.
+std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& motions,
+                                        const SequenceOptions& options);
 
 }  // namespace figurine::capture

@@ -1,4 +1,5 @@
-// The light of the captures and how surfaces answer it. Linear light in, linear light out; no geometry, no rays.
+// The light of the captures and how surfaces answer it. Linear light in, linear light out; no
+// geometry, no rays.
 #pragma once
 
 #include <array>
@@ -9,14 +10,16 @@
 
 namespace figurine::capture {
 
-// Fixed in the world, so that a person's look depends on where they turn. +z is the front, +x the left of a figure at heading 0.
+// Fixed in the world, so that a person's look depends on where they turn. +z is the front, +x the
+// left of a figure at heading 0.
 struct Lighting {
   Vec3 key_direction = normalized({0.52f, 0.74f, 0.62f});  // towards the light
-  Vec3 key_colour{1.12f, 1.02f, 0.88f};                    // irradiance of a surface that faces it, divided by pi
-  float key_radius = 0.035f;                               // of the light's disc, seen from the figure: tan of 2 degrees
-  Vec3 sky_colour{0.46f, 0.515f, 0.59f};                   // from straight above
-  Vec3 ground_colour{0.25f, 0.225f, 0.20f};                // from straight below
-  float bounce = 0.25f;                                    // what an occluded direction still brings: light that the figure itself reflects
+  Vec3 key_colour{1.12f, 1.02f, 0.88f};  // irradiance of a surface that faces it, divided by pi
+  float key_radius = 0.035f;  // of the light's disc, seen from the figure: tan of 2 degrees
+  Vec3 sky_colour{0.46f, 0.515f, 0.59f};     // from straight above
+  Vec3 ground_colour{0.25f, 0.225f, 0.20f};  // from straight below
+  float bounce =
+      0.25f;  // what an occluded direction still brings: light that the figure itself reflects
   Vec3 fill_direction = normalized({-0.75f, 0.25f, -0.45f});
   Vec3 fill_colour{0.11f, 0.13f, 0.165f};  // casts no shadow
 };
@@ -54,9 +57,12 @@ inline Gloss gloss_of(Surfacing surfacing) {
   return {0, 1};
 }
 
-// How far past the terminator skin still glows: light that scattered below the surface, red furthest.
+// How far past the terminator skin still glows: light that scattered below the surface, red
+// furthest.
 inline Vec3 wrap_of(Surfacing surfacing) {
-  return surfacing == Surfacing::kSkin ? Vec3{0.24f, 0.11f, 0.07f} : surfacing == Surfacing::kHair ? Vec3{0.2f, 0.2f, 0.2f} : Vec3{};
+  return surfacing == Surfacing::kSkin   ? Vec3{0.24f, 0.11f, 0.07f}
+         : surfacing == Surfacing::kHair ? Vec3{0.2f, 0.2f, 0.2f}
+                                         : Vec3{};
 }
 
 // GGX lobe with the visibility term of Karis and Lazarov's mobile approximation.
@@ -75,9 +81,13 @@ inline Vec3 shade(const Lighting& light, const SurfacePoint& p, float visible) {
   const Vec3 wrap = wrap_of(p.surfacing);
   const auto lit = [&](float w) { return std::fmax(nl + w, 0.0f) / (1 + w); };
   const Vec3 key = light.key_colour * Vec3{lit(wrap.x), lit(wrap.y), lit(wrap.z)} * visible;
-  const Vec3 fill = light.fill_colour * std::fmax(0.5f + 0.5f * dot(p.normal, light.fill_direction), 0.0f);
+  const Vec3 fill =
+      light.fill_colour * std::fmax(0.5f + 0.5f * dot(p.normal, light.fill_direction), 0.0f);
   Vec3 out = p.albedo * (key + fill + p.ambient);
-  if (nl > 0) out += light.key_colour * (specular(gloss_of(p.surfacing), p.normal, p.to_view, light.key_direction) * nl * visible);
+  if (nl > 0)
+    out +=
+        light.key_colour *
+        (specular(gloss_of(p.surfacing), p.normal, p.to_view, light.key_direction) * nl * visible);
   return out;
 }
 

@@ -1,7 +1,9 @@
-// How far a posed surface is stretched and compressed against its rest shape: Green's strain of every face, gathered at the vertices.
+// How far a posed surface is stretched and compressed against its rest shape: Green's strain of
+// every face, gathered at the vertices.
 //
-// Strains are symmetric tensors in rest space that vanish along the normal. They know nothing of texture coordinates, so they can be added
-// and interpolated across the surface without seams. A rigid motion has none; faces without area have no say.
+// Strains are symmetric tensors in rest space that vanish along the normal. They know nothing of
+// texture coordinates, so they can be added and interpolated across the surface without seams. A
+// rigid motion has none; faces without area have no say.
 #pragma once
 
 #include <array>
@@ -20,17 +22,20 @@ struct Strain {
 inline Strain operator+(const Strain& a, const Strain& b) {
   return {a.xx + b.xx, a.yy + b.yy, a.zz + b.zz, a.xy + b.xy, a.yz + b.yz, a.zx + b.zx};
 }
-inline Strain operator*(const Strain& a, float s) { return {a.xx * s, a.yy * s, a.zz * s, a.xy * s, a.yz * s, a.zx * s}; }
+inline Strain operator*(const Strain& a, float s) {
+  return {a.xx * s, a.yy * s, a.zz * s, a.xy * s, a.yz * s, a.zx * s};
+}
 
 // a . E b
 inline float contract(const Strain& e, Vec3 a, Vec3 b) {
-  return e.xx * a.x * b.x + e.yy * a.y * b.y + e.zz * a.z * b.z + e.xy * (a.x * b.y + a.y * b.x) + e.yz * (a.y * b.z + a.z * b.y) +
-         e.zx * (a.z * b.x + a.x * b.z);
+  return e.xx * a.x * b.x + e.yy * a.y * b.y + e.zz * a.z * b.z + e.xy * (a.x * b.y + a.y * b.x) +
+         e.yz * (a.y * b.z + a.z * b.y) + e.zx * (a.z * b.x + a.x * b.z);
 }
 
 // weight * t t^T
 inline Strain outer(Vec3 t, float weight) {
-  return {weight * t.x * t.x, weight * t.y * t.y, weight * t.z * t.z, weight * t.x * t.y, weight * t.y * t.z, weight * t.z * t.x};
+  return {weight * t.x * t.x, weight * t.y * t.y, weight * t.z * t.z,
+          weight * t.x * t.y, weight * t.y * t.z, weight * t.z * t.x};
 }
 
 class StrainGauge {
@@ -38,8 +43,8 @@ class StrainGauge {
   // rest_m [V,3], triangles [F,3].
   StrainGauge(std::span<const float> rest_m, std::span<const uint32_t> triangles);
 
-  // [V] of a pose, smoothed over the neighbours: skinning weights are painted vertex by vertex, cloth is not. posed_m [V,3] finite. The
-  // result is bounded, whatever the pose.
+  // [V] of a pose, smoothed over the neighbours: skinning weights are painted vertex by vertex,
+  // cloth is not. posed_m [V,3] finite. The result is bounded, whatever the pose.
   std::vector<Strain> measure(std::span<const float> posed_m) const;
 
  private:
@@ -56,7 +61,8 @@ class StrainGauge {
 
 // The directions of one strain within a tangent plane.
 struct Compression {
-  float along = 0;   // share of its length that the surface has lost along `direction`, where it lost most: 0 if nowhere
+  float along = 0;   // share of its length that the surface has lost along `direction`, where it
+                     // lost most: 0 if nowhere
   float across = 0;  // and along the direction at right angles, 0 <= across <= along < 1
   Vec3 direction;    // unit, in the plane; of no meaning, sign included, where along = across
 };

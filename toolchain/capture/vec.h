@@ -1,4 +1,5 @@
-// Three floats and the few operations that ray tracing needs. Plain structs, so that the shading loop stays free of templates.
+// Three floats and the few operations that ray tracing needs. Plain structs, so that the shading
+// loop stays free of templates.
 #pragma once
 
 #include <cmath>
@@ -17,7 +18,9 @@ inline Vec3 operator*(Vec3 a, float s) { return {a.x * s, a.y * s, a.z * s}; }
 inline Vec3 operator*(float s, Vec3 a) { return a * s; }
 inline Vec3& operator+=(Vec3& a, Vec3 b) { return a = a + b; }
 inline float dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+inline Vec3 cross(Vec3 a, Vec3 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 inline float length(Vec3 a) { return std::sqrt(dot(a, a)); }
 // The zero vector stays zero.
 inline Vec3 normalized(Vec3 a) {

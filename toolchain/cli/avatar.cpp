@@ -27,7 +27,8 @@ constexpr uint32_t kDefaultOctaves = 5;
 struct AvatarArguments {
   std::string data, body, run;
   bool all = false, resume = false, quiet = false;
-  std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser, standoff;
+  std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser,
+      standoff;
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay;
   std::optional<float> spacing_scale;
@@ -47,49 +48,61 @@ Enum choose(const std::string& text, std::initializer_list<Enum> values) {
 
 void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   using train::TrainingBackground;
-  if (arguments.template_mode) settings.template_mode = *arguments.template_mode == "mean" ? TemplateMode::kMean : TemplateMode::kShaped;
+  if (arguments.template_mode)
+    settings.template_mode =
+        *arguments.template_mode == "mean" ? TemplateMode::kMean : TemplateMode::kShaped;
   if (arguments.freeze_pose) settings.freeze_pose = true;
   if (arguments.fourier) {
-    settings.fourier_octaves = *arguments.fourier == "off"  ? 0
-                               : *arguments.fourier == "on" ? kDefaultOctaves
-                                                            : uint32_t(std::stoul(*arguments.fourier));
+    settings.fourier_octaves = *arguments.fourier == "off" ? 0
+                               : *arguments.fourier == "on"
+                                   ? kDefaultOctaves
+                                   : uint32_t(std::stoul(*arguments.fourier));
   }
   if (arguments.seed) settings.seed = *arguments.seed;
   if (arguments.init) settings.init = *arguments.init;
   if (arguments.learning_rate) settings.schedule.peak = *arguments.learning_rate;
-  if (arguments.optimiser) settings.optimiser = choose(*arguments.optimiser, {train::OptimiserKind::kAdamW, train::OptimiserKind::kMuon});
+  if (arguments.optimiser)
+    settings.optimiser =
+        choose(*arguments.optimiser, {train::OptimiserKind::kAdamW, train::OptimiserKind::kMuon});
   if (arguments.weight_decay) settings.weight_decay = *arguments.weight_decay;
   if (arguments.spacing_scale) settings.decoding.spacing_scale = *arguments.spacing_scale;
   if (arguments.warmup) settings.warmup_iterations = *arguments.warmup;
   if (arguments.views) settings.views_per_pose = *arguments.views;
   if (arguments.poses) settings.poses_per_iteration = *arguments.poses;
-  if (arguments.iterations) settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
-  if (arguments.minutes) settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};
+  if (arguments.iterations)
+    settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
+  if (arguments.minutes)
+    settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};
   if (arguments.precision) {
-    settings.bf16 = *arguments.precision == "bf16" || (*arguments.precision == "auto" && train::has_fast_bf16());
+    settings.bf16 = *arguments.precision == "bf16" ||
+                    (*arguments.precision == "auto" && train::has_fast_bf16());
   }
   if (arguments.standoff)
-    settings.standoff_weight = *arguments.standoff == "on"    ? train::TrainSettings{}.standoff_weight
+    settings.standoff_weight = *arguments.standoff == "on" ? train::TrainSettings{}.standoff_weight
                                : *arguments.standoff == "off" ? 0
                                                               : std::stof(*arguments.standoff);
   if (arguments.background) {
-    settings.background =
-        choose(*arguments.background, {TrainingBackground::kBlack, TrainingBackground::kGrey, TrainingBackground::kRandom});
+    settings.background = choose(
+        *arguments.background,
+        {TrainingBackground::kBlack, TrainingBackground::kGrey, TrainingBackground::kRandom});
   }
 }
 
 uint32_t core_count() { return std::clamp(std::thread::hardware_concurrency(), 1u, 16u); }
 
-// Two one-thread trainings on two cores do more than one of two threads after the other (docs/training.md).
+// Two one-thread trainings on two cores do more than one of two threads after the other
+// (docs/training.md).
 uint32_t thread_count(const AvatarArguments& arguments) {
   return arguments.threads > 0 ? arguments.threads : arguments.all ? 1 : core_count();
 }
 
 uint32_t slot_count(const AvatarArguments& arguments) {
-  return arguments.slots > 0 ? arguments.slots : std::max(1u, core_count() / thread_count(arguments));
+  return arguments.slots > 0 ? arguments.slots
+                             : std::max(1u, core_count() / thread_count(arguments));
 }
 
-train::TrainRequest make_request(const AvatarArguments& arguments, const std::string& data, const std::string& run) {
+train::TrainRequest make_request(const AvatarArguments& arguments, const std::string& data,
+                                 const std::string& run) {
   train::TrainRequest request{.data = data,
                               .body = arguments.body,
                               .run = run,
@@ -105,15 +118,18 @@ train::TrainRequest make_request(const AvatarArguments& arguments, const std::st
     if (arguments.preset && *arguments.preset != old.settings.preset)
       throw InputError(run + ": --preset differs from the run that is resumed");
     overlay(arguments, request.settings);
-    const nlohmann::json asked = train::to_json(request.settings), was = train::to_json(old.settings);
+    const nlohmann::json asked = train::to_json(request.settings),
+                         was = train::to_json(old.settings);
     for (const auto& [key, value] : was.items()) {
       if (asked.at(key) != value)
-        throw InputError(run + ": --resume goes on with the run's own settings; " + key + " differs from run.json");
+        throw InputError(run + ": --resume goes on with the run's own settings; " + key +
+                         " differs from run.json");
     }
   } else {
     if (request.data.empty()) throw InputError("--data is needed for a new run");
     if (request.body.empty()) throw InputError("--body is needed for a new run");
-    request.resume = arguments.resume && !arguments.all;  // with --all, what has not begun begins now
+    request.resume =
+        arguments.resume && !arguments.all;  // with --all, what has not begun begins now
     request.settings = train::preset_settings(arguments.preset.value_or("edge"));
     request.settings.bf16 = train::has_fast_bf16();
     overlay(arguments, request.settings);
@@ -124,15 +140,19 @@ train::TrainRequest make_request(const AvatarArguments& arguments, const std::st
 
 void train_one(const AvatarArguments& arguments) {
   const std::string& run = arguments.run;
-  const train::TrainResult result = train::train_avatar(make_request(arguments, arguments.data, run));
+  const train::TrainResult result =
+      train::train_avatar(make_request(arguments, arguments.data, run));
   if (arguments.quiet) return;
   if (result.was_finished) {
-    std::printf("%s: was finished already (%llu iterations)\n", run.c_str(), static_cast<unsigned long long>(result.state.iteration));
+    std::printf("%s: was finished already (%llu iterations)\n", run.c_str(),
+                static_cast<unsigned long long>(result.state.iteration));
     return;
   }
   std::printf("%s: %llu iterations in %s (%.1f a second), training PSNR %.2f dB\n", run.c_str(),
-              static_cast<unsigned long long>(result.state.iteration), train::format_duration(result.state.seconds).c_str(),
-              static_cast<double>(result.state.iteration) / std::max(1e-9, result.state.seconds), result.psnr_db);
+              static_cast<unsigned long long>(result.state.iteration),
+              train::format_duration(result.state.seconds).c_str(),
+              static_cast<double>(result.state.iteration) / std::max(1e-9, result.state.seconds),
+              result.psnr_db);
 }
 
 }  // namespace
@@ -140,60 +160,99 @@ void train_one(const AvatarArguments& arguments) {
 void add_avatar_command(CLI::App& app) {
   auto arguments = std::make_shared<AvatarArguments>();
   CLI::App* command = app.add_subcommand("avatar", "Train one person's avatar from a capture");
-  command->add_option("--data", arguments->data, "Folder of one identity (with --all: of identities)");
+  command->add_option("--data", arguments->data,
+                      "Folder of one identity (with --all: of identities)");
   command->add_option("--body", arguments->body, "Body package (figurine-train body)");
-  command->add_option("-o,--output", arguments->run, "Folder of the run (with --all: of runs)")->required();
-  command->add_flag("--all", arguments->all, "Every identity of the folder; one that fails does not stop the others");
-  command->add_flag("--resume", arguments->resume, "Go on from the last checkpoint, by the run's own settings");
+  command->add_option("-o,--output", arguments->run, "Folder of the run (with --all: of runs)")
+      ->required();
+  command->add_flag("--all", arguments->all,
+                    "Every identity of the folder; one that fails does not stop the others");
+  command->add_flag("--resume", arguments->resume,
+                    "Go on from the last checkpoint, by the run's own settings");
   command->add_flag("--quiet", arguments->quiet, "No progress, no summary");
-  command->add_option("--preset", arguments->preset, "Size of the network (default edge)")->check(CLI::IsMember({"nano", "edge", "paper"}));
-  command->add_option("--init", arguments->init, "Start from these weights (file or run) instead of the common initial ones");
+  command->add_option("--preset", arguments->preset, "Size of the network (default edge)")
+      ->check(CLI::IsMember({"nano", "edge", "paper"}));
+  command->add_option("--init", arguments->init,
+                      "Start from these weights (file or run) instead of the common initial ones");
   command->add_option("--seed", arguments->seed, "Of the order of the images (default 1)");
   CLI::Option* minutes =
-      command->add_option("--minutes", arguments->minutes, "Train for so long (default 10); the learning rate follows the clock")
+      command
+          ->add_option("--minutes", arguments->minutes,
+                       "Train for so long (default 10); the learning rate follows the clock")
           ->check(CLI::PositiveNumber);
   command->add_option("--iterations", arguments->iterations, "Train for so many iterations instead")
       ->check(CLI::PositiveNumber)
       ->excludes(minutes);
-  command->add_option("--template", arguments->template_mode, "Gaussians sit on the person's own shape (default) or on the mean template")
+  command
+      ->add_option("--template", arguments->template_mode,
+                   "Gaussians sit on the person's own shape (default) or on the mean template")
       ->check(CLI::IsMember({"shaped", "mean"}));
-  command->add_flag("--freeze-pose", arguments->freeze_pose, "Experiment: the network sees the rest pose in the true root orientation");
+  command->add_flag("--freeze-pose", arguments->freeze_pose,
+                    "Experiment: the network sees the rest pose in the true root orientation");
   command
       ->add_option("--fourier", arguments->fourier,
-                   "Octaves of constant Fourier channels in the input, 1 to 10, or on (5) or off (default: the preset's)")
+                   "Octaves of constant Fourier channels in the input, 1 to 10, or on (5) or off "
+                   "(default: the preset's)")
       ->check(CLI::IsMember({"on", "off"}) | CLI::Range(1, 10));
-  command->add_option("--learning-rate", arguments->learning_rate, "Peak of the schedule (default 2e-3)")->check(CLI::PositiveNumber);
+  command
+      ->add_option("--learning-rate", arguments->learning_rate,
+                   "Peak of the schedule (default 2e-3)")
+      ->check(CLI::PositiveNumber);
   command
       ->add_option("--optimiser", arguments->optimiser,
-                   "muon (default): Muon for the kernels of hidden convolutions, AdamW for the rest; adamw: AdamW for all, as in the paper")
+                   "muon (default): Muon for the kernels of hidden convolutions, AdamW for the "
+                   "rest; adamw: AdamW for all, as in the paper")
       ->check(CLI::IsMember({"adamw", "muon"}));
-  command->add_option("--weight-decay", arguments->weight_decay, "The optimiser's (default 0)")->check(CLI::NonNegativeNumber);
-  command->add_option("--precision", arguments->precision, "Of the convolutions (default auto: bf16 where the CPU has it)")
+  command->add_option("--weight-decay", arguments->weight_decay, "The optimiser's (default 0)")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--precision", arguments->precision,
+                   "Of the convolutions (default auto: bf16 where the CPU has it)")
       ->check(CLI::IsMember({"auto", "f32", "bf16"}));
-  command->add_option("--background", arguments->background, "Behind prediction and truth in the loss (default grey)")
+  command
+      ->add_option("--background", arguments->background,
+                   "Behind prediction and truth in the loss (default grey)")
       ->check(CLI::IsMember({"black", "grey", "random"}));
   command
       ->add_option("--standoff", arguments->standoff,
-                   "Draw Gaussians to hair, skirts and shoes that stand off the skin: on (default), off, or a weight")
+                   "Draw Gaussians to hair, skirts and shoes that stand off the skin: on "
+                   "(default), off, or a weight")
       ->check(CLI::IsMember({"on", "off"}) | CLI::Range(0.0, 1000.0));
-  command->add_option("--views-per-pose", arguments->views, "Images of one pose an iteration (default 1, as in the paper)")
-      ->check(CLI::Range(1, 64));
-  command->add_option("--poses", arguments->poses, "Poses an iteration, side by side on threads of their own (default 1)")
+  command
+      ->add_option("--views-per-pose", arguments->views,
+                   "Images of one pose an iteration (default 1, as in the paper)")
       ->check(CLI::Range(1, 64));
   command
-      ->add_option("--spacing-scale", arguments->spacing_scale, "First radius of a Gaussian, in distances to the next texel (default 0.45)")
+      ->add_option("--poses", arguments->poses,
+                   "Poses an iteration, side by side on threads of their own (default 1)")
+      ->check(CLI::Range(1, 64));
+  command
+      ->add_option("--spacing-scale", arguments->spacing_scale,
+                   "First radius of a Gaussian, in distances to the next texel (default 0.45)")
       ->check(CLI::Range(0.05, 5.0));
-  command->add_option("--warmup", arguments->warmup, "Iterations of fitting reference Gaussians first (default 0)");
-  command->add_option("--threads", arguments->threads, "Of a training (default: all cores; with --all: 1)")->check(CLI::Range(1, 256));
-  command->add_option("--slots", arguments->slots, "With --all: trainings at a time, each in its own process (default: cores / threads)")
+  command->add_option("--warmup", arguments->warmup,
+                      "Iterations of fitting reference Gaussians first (default 0)");
+  command
+      ->add_option("--threads", arguments->threads,
+                   "Of a training (default: all cores; with --all: 1)")
+      ->check(CLI::Range(1, 256));
+  command
+      ->add_option(
+          "--slots", arguments->slots,
+          "With --all: trainings at a time, each in its own process (default: cores / threads)")
       ->check(CLI::Range(1, 256));
   command->callback([arguments] {
     if (arguments->all) {
       if (arguments->data.empty()) throw InputError("--all needs --data");
       const auto request_of = [&](const std::string& identity) {
-        return make_request(*arguments, arguments->data + "/" + identity, arguments->run + "/" + identity);
+        return make_request(*arguments, arguments->data + "/" + identity,
+                            arguments->run + "/" + identity);
       };
-      train_all({.data = arguments->data, .runs = arguments->run, .slots = slot_count(*arguments), .quiet = arguments->quiet}, request_of);
+      train_all({.data = arguments->data,
+                 .runs = arguments->run,
+                 .slots = slot_count(*arguments),
+                 .quiet = arguments->quiet},
+                request_of);
     } else {
       train_one(*arguments);
     }

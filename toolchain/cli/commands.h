@@ -1,5 +1,5 @@
-// One function per command of figurine-train: adds the subcommand, its options and the callback that runs it. Callbacks throw InputError on
-// bad input.
+// One function per command of figurine-train: adds the subcommand, its options and the callback
+// that runs it. Callbacks throw InputError on bad input.
 #pragma once
 
 namespace CLI {

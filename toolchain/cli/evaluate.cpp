@@ -1,5 +1,6 @@
-// figurine-train evaluate: how good a trained avatar is (reconstruction), what fixed point (quantization) and a population's rounding
-// (population) cost it, and whether the device draws the same (parity). What a population is like (members) is in evaluate_members.cpp.
+// figurine-train evaluate: how good a trained avatar is (reconstruction), what fixed point
+// (quantization) and a population's rounding (population) cost it, and whether the device draws the
+// same (parity). What a population is like (members) is in evaluate_members.cpp.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -51,13 +52,17 @@ nlohmann::json report_head(const EvaluateArguments& arguments, const train::Trai
   return report;
 }
 
-nlohmann::json finite(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+nlohmann::json finite(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
 
 void print_group(const char* title, const nlohmann::json& group) {
-  const auto number = [&](const char* key) { return group.at(key).is_number() ? group.at(key).get<double>() : NAN; };
-  std::printf("%-22s %6.2f dB  flat %6.2f  crop %6.2f  head %6.2f  high-pass %.2f  (%d images)\n", title, number("psnr_db"),
-              number("flat_psnr_db"), number("crop_psnr_db"), number("head_psnr_db"), number("highpass_ratio"),
-              group.at("images").get<int>());
+  const auto number = [&](const char* key) {
+    return group.at(key).is_number() ? group.at(key).get<double>() : NAN;
+  };
+  std::printf("%-22s %6.2f dB  flat %6.2f  crop %6.2f  head %6.2f  high-pass %.2f  (%d images)\n",
+              title, number("psnr_db"), number("flat_psnr_db"), number("crop_psnr_db"),
+              number("head_psnr_db"), number("highpass_ratio"), group.at("images").get<int>());
 }
 
 void run_reconstruction(const EvaluateArguments& arguments) {
@@ -66,7 +71,9 @@ void run_reconstruction(const EvaluateArguments& arguments) {
   report.update(evaluate::evaluate_reconstruction(avatar, arguments.reconstruction));
   if (!arguments.sheet.empty()) {
     const ports::ImageU8 sheet = evaluate::make_contact_sheet(avatar, {});
-    throw_if_error(ports::write_file_atomically(arguments.sheet, value_or_throw(ports::encode_png(sheet), arguments.sheet)), "cannot save");
+    throw_if_error(ports::write_file_atomically(
+                       arguments.sheet, value_or_throw(ports::encode_png(sheet), arguments.sheet)),
+                   "cannot save");
     report["contact_sheet"] = arguments.sheet;
   }
   train::write_json(train::RunDirectory{arguments.open.run}.evaluation(), report);
@@ -81,7 +88,8 @@ void run_reconstruction(const EvaluateArguments& arguments) {
 void run_parity(const EvaluateArguments& arguments) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
   const train::AvatarFile device = train::open_avatar(arguments.package);
-  const verify::ParityReport parity = verify::compare_with_runtime(avatar, device.avatar, arguments.parity);
+  const verify::ParityReport parity =
+      verify::compare_with_runtime(avatar, device.avatar, arguments.parity);
   nlohmann::json report = report_head(arguments, avatar);
   report["package"] = arguments.package;
   report["precision"] = arguments.precision;
@@ -97,14 +105,18 @@ void run_parity(const EvaluateArguments& arguments) {
                                {"foreground_pixels", view.foreground}});
   }
   if (!arguments.output.empty()) train::write_json(arguments.output, report);
-  std::printf("parity with the runtime: %.2f dB over %zu pictures (worst %.2f dB), largest error %.2g\n", parity.psnr_db,
-              parity.views.size(), parity.worst_psnr_db, parity.largest_error);
+  std::printf(
+      "parity with the runtime: %.2f dB over %zu pictures (worst %.2f dB), largest error %.2g\n",
+      parity.psnr_db, parity.views.size(), parity.worst_psnr_db, parity.largest_error);
 }
 
 void print_row(const nlohmann::json& row) {
-  const auto number = [&](const char* key) { return row.contains(key) && row.at(key).is_number() ? row.at(key).get<double>() : NAN; };
-  std::printf("%-24s drop %6.3f dB  to f32 %6.2f  slow motion %6.2f  trembling %6.2f dB\n", row.at("name").get<std::string>().c_str(),
-              number("psnr_drop_db"), number("psnr_to_f32_db"), number("slow_motion_db"), number("trembling_pose_db"));
+  const auto number = [&](const char* key) {
+    return row.contains(key) && row.at(key).is_number() ? row.at(key).get<double>() : NAN;
+  };
+  std::printf("%-24s drop %6.3f dB  to f32 %6.2f  slow motion %6.2f  trembling %6.2f dB\n",
+              row.at("name").get<std::string>().c_str(), number("psnr_drop_db"),
+              number("psnr_to_f32_db"), number("slow_motion_db"), number("trembling_pose_db"));
 }
 
 void run_quantization(const EvaluateArguments& arguments) {
@@ -124,7 +136,8 @@ void run_quantization(const EvaluateArguments& arguments) {
     open.run = arguments.runs[i];
     train::TrainedAvatar avatar = train::TrainedAvatar::open(open);
     reports.push_back(evaluate::evaluate_quantization(avatar, {open.run}, options));
-    if (!arguments.packages.empty()) reports.back()["package_bytes"] = std::filesystem::file_size(arguments.packages[i]);
+    if (!arguments.packages.empty())
+      reports.back()["package_bytes"] = std::filesystem::file_size(arguments.packages[i]);
   }
   nlohmann::json report = evaluate::summarise_quantization(reports);
   if (!arguments.packages.empty()) report["package_bytes"] = reports.front().at("package_bytes");
@@ -137,7 +150,8 @@ void run_quantization(const EvaluateArguments& arguments) {
 }
 
 void run_population(const EvaluateArguments& arguments) {
-  constexpr double kMostLoss_db = 0.2;  // beyond it, a population is to be packed with --precision f16
+  constexpr double kMostLoss_db =
+      0.2;  // beyond it, a population is to be packed with --precision f16
   nlohmann::json report{{"command", train::current_command()},
                         {"commit", train::current_commit()},
                         {"machine", train::describe_machine()},
@@ -156,10 +170,12 @@ void run_population(const EvaluateArguments& arguments) {
     report["package_bytes"] = member.file.package.size_bytes();
     report["package_hash"] = format_hash(member.file.package.content_hash());
     for (const char* group : {"views", "poses"}) {
-      const auto number = [&](const char* key) { return row.at(group).at(key).is_number() ? row.at(group).at(key).get<double>() : NAN; };
+      const auto number = [&](const char* key) {
+        return row.at(group).at(key).is_number() ? row.at(group).at(key).get<double>() : NAN;
+      };
       if (std::isfinite(number("loss_db"))) worst = std::max(worst, number("loss_db"));
-      std::printf("%-12s %-6s %6.2f dB, as a member %6.2f dB, loss %6.3f dB\n", name.c_str(), group, number("psnr_db"),
-                  number("member_psnr_db"), number("loss_db"));
+      std::printf("%-12s %-6s %6.2f dB, as a member %6.2f dB, loss %6.3f dB\n", name.c_str(), group,
+                  number("psnr_db"), number("member_psnr_db"), number("loss_db"));
     }
     report["members"].push_back(std::move(row));
   }
@@ -167,14 +183,18 @@ void run_population(const EvaluateArguments& arguments) {
   report["most_loss_db"] = kMostLoss_db;
   report["passed"] = worst <= kMostLoss_db && std::isfinite(worst);
   if (!arguments.output.empty()) train::write_json(arguments.output, report);
-  std::printf("worst loss %.3f dB: %s %.1f dB\n", worst, worst <= kMostLoss_db ? "within" : "ABOVE", kMostLoss_db);
+  std::printf("worst loss %.3f dB: %s %.1f dB\n", worst, worst <= kMostLoss_db ? "within" : "ABOVE",
+              kMostLoss_db);
 }
 
 void add_run_options(CLI::App* command, const std::shared_ptr<EvaluateArguments>& arguments) {
   command->add_option("--run", arguments->open.run, "Folder of a run")->required();
-  command->add_option("--data", arguments->open.data, "Where the data is now (default: where the run found it)");
-  command->add_option("--body", arguments->open.body, "Where the body is now (default: where the run found it)");
-  command->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->add_option("--data", arguments->open.data,
+                      "Where the data is now (default: where the run found it)");
+  command->add_option("--body", arguments->open.body,
+                      "Where the body is now (default: where the run found it)");
+  command->add_option("--threads", arguments->open.threads, "Default: all cores")
+      ->check(CLI::Range(1, 256));
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");
 }
 
@@ -186,38 +206,56 @@ void add_evaluate_command(CLI::App& app) {
   auto arguments = std::make_shared<EvaluateArguments>();
   arguments->open.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
 
-  CLI::App* reconstruction = command->add_subcommand("reconstruction", "Held-out cameras and poses against the truth");
+  CLI::App* reconstruction =
+      command->add_subcommand("reconstruction", "Held-out cameras and poses against the truth");
   add_run_options(reconstruction, arguments);
-  reconstruction->add_option("--sheet", arguments->sheet, "Contact sheet to write, PNG: truth left, prediction right");
+  reconstruction->add_option("--sheet", arguments->sheet,
+                             "Contact sheet to write, PNG: truth left, prediction right");
   reconstruction
-      ->add_option("--view-frame-step", arguments->reconstruction.view_frame_step, "Look at every n-th training pose only (default 1: all)")
+      ->add_option("--view-frame-step", arguments->reconstruction.view_frame_step,
+                   "Look at every n-th training pose only (default 1: all)")
       ->check(CLI::PositiveNumber);
   reconstruction->callback([arguments] { run_reconstruction(*arguments); });
 
-  CLI::App* quantization = command->add_subcommand("quantization", "Fixed point against float and against the truth, layer by layer");
-  quantization->add_option("--run", arguments->runs, "Folder of a run; may be given several times")->required();
-  quantization->add_option("--package", arguments->packages, "Its package, for the size; one for every run");
-  quantization->add_option("--motion", arguments->quantization.motion,
-                           "Package whose beginning is slowed down (default: the capture's frames)");
+  CLI::App* quantization = command->add_subcommand(
+      "quantization", "Fixed point against float and against the truth, layer by layer");
+  quantization->add_option("--run", arguments->runs, "Folder of a run; may be given several times")
+      ->required();
+  quantization->add_option("--package", arguments->packages,
+                           "Its package, for the size; one for every run");
+  quantization->add_option(
+      "--motion", arguments->quantization.motion,
+      "Package whose beginning is slowed down (default: the capture's frames)");
   quantization->add_flag("--no-qat", arguments->no_qat, "Leave the fine-tuned rows out");
-  quantization->add_option("--qat-iterations", arguments->fine_tune.iterations, "Of the fine-tune in RUN/qat (default 400)")
+  quantization
+      ->add_option("--qat-iterations", arguments->fine_tune.iterations,
+                   "Of the fine-tune in RUN/qat (default 400)")
       ->check(CLI::PositiveNumber);
-  quantization->add_option("--views-per-pose", arguments->quantization.views_per_pose, "Cameras of a held-out pose (default 4)")
+  quantization
+      ->add_option("--views-per-pose", arguments->quantization.views_per_pose,
+                   "Cameras of a held-out pose (default 4)")
       ->check(CLI::PositiveNumber);
-  quantization->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
+  quantization->add_option("--threads", arguments->open.threads, "Default: all cores")
+      ->check(CLI::Range(1, 256));
   quantization->add_flag("--quiet", arguments->quantization.quiet, "No progress");
   quantization->add_option("-o,--output", arguments->output, "Report to write, JSON");
   quantization->callback([arguments] { run_quantization(*arguments); });
 
-  CLI::App* population = command->add_subcommand("population", "What a population's rounding costs its members, against the truth");
+  CLI::App* population = command->add_subcommand(
+      "population", "What a population's rounding costs its members, against the truth");
   population->add_option("--package", arguments->package, "Population package")->required();
-  population->add_option("--run", arguments->runs, "Run of a member, which is called as its data's folder is; may be given several times")
+  population
+      ->add_option(
+          "--run", arguments->runs,
+          "Run of a member, which is called as its data's folder is; may be given several times")
       ->required();
   population
-      ->add_option("--view-frame-step", arguments->requantization.view_frame_step, "Look at every n-th training pose only (default 8)")
+      ->add_option("--view-frame-step", arguments->requantization.view_frame_step,
+                   "Look at every n-th training pose only (default 8)")
       ->check(CLI::PositiveNumber);
   population->add_flag("--quiet", arguments->requantization.quiet, "No progress");
-  population->add_option("--threads", arguments->open.threads, "Default: all cores")->check(CLI::Range(1, 256));
+  population->add_option("--threads", arguments->open.threads, "Default: all cores")
+      ->check(CLI::Range(1, 256));
   population->add_option("-o,--output", arguments->output, "Report to write, JSON");
   population->callback([arguments] { run_population(*arguments); });
 
@@ -226,13 +264,21 @@ void add_evaluate_command(CLI::App& app) {
   add_evaluate_sampling_command(*command);
   add_evaluate_features_command(*command);
 
-  CLI::App* parity = command->add_subcommand("parity", "The runtime's picture against the trainer's, before rounding to 8 bits");
+  CLI::App* parity = command->add_subcommand(
+      "parity", "The runtime's picture against the trainer's, before rounding to 8 bits");
   add_run_options(parity, arguments);
-  parity->add_option("--package", arguments->package, "Avatar package made from the run, or PACKAGE#MEMBER of a population")->required();
-  parity->add_option("--views", arguments->parity.views, "Held-out pictures to compare (default 12)")->check(CLI::PositiveNumber);
-  parity->add_option("--precision", arguments->precision, "Of both (default f32)")->check(CLI::IsMember({"f32", "q8"}));
+  parity
+      ->add_option("--package", arguments->package,
+                   "Avatar package made from the run, or PACKAGE#MEMBER of a population")
+      ->required();
+  parity
+      ->add_option("--views", arguments->parity.views, "Held-out pictures to compare (default 12)")
+      ->check(CLI::PositiveNumber);
+  parity->add_option("--precision", arguments->precision, "Of both (default f32)")
+      ->check(CLI::IsMember({"f32", "q8"}));
   parity->callback([arguments] {
-    arguments->parity.precision = arguments->precision == "q8" ? Precision::kFixedPoint : Precision::kFloat32;
+    arguments->parity.precision =
+        arguments->precision == "q8" ? Precision::kFixedPoint : Precision::kFloat32;
     arguments->parity.threads = arguments->open.threads;
     run_parity(*arguments);
   });

@@ -24,8 +24,9 @@ struct FeaturesArguments {
 };
 
 void print_found(const char* part, const nlohmann::json& found) {
-  std::printf("%s members, the same person among %d in another pose from another side (chance %.1f %%)\n", part,
-              found.at("members").get<int>(), 100 * found.at("chance").get<double>());
+  std::printf(
+      "%s members, the same person among %d in another pose from another side (chance %.1f %%)\n",
+      part, found.at("members").get<int>(), 100 * found.at("chance").get<double>());
   std::printf("  %-44s %5.1f %%\n", "pixels", 100 * found.at("pixels").get<double>());
   for (const char* kind : {"features", "distance"}) {
     for (const auto& [name, share] : found.at(kind).items()) {
@@ -38,13 +39,16 @@ void print_report(const nlohmann::json& report) {
   print_found("held-out", report.at("held_out"));
   print_found("training", report.at("training"));
   for (const auto& [name, scale] : report.at("scale").items()) {
-    std::printf("%s: another person %.3f, another pose %.3f", name.c_str(), scale.at("other_person_same_shot").get<double>(),
+    std::printf("%s: another person %.3f, another pose %.3f", name.c_str(),
+                scale.at("other_person_same_shot").get<double>(),
                 scale.at("same_person_other_shot").get<double>());
     for (const nlohmann::json& row : scale.at("blur")) {
-      std::printf(", blur %.1f px %.3f", row.at("deviation_px").get<double>(), row.at("distance").get<double>());
+      std::printf(", blur %.1f px %.3f", row.at("deviation_px").get<double>(),
+                  row.at("distance").get<double>());
     }
     for (const nlohmann::json& row : scale.at("noise")) {
-      std::printf(", noise %.2f %.3f", row.at("deviation").get<double>(), row.at("distance").get<double>());
+      std::printf(", noise %.2f %.3f", row.at("deviation").get<double>(),
+                  row.at("distance").get<double>());
     }
     std::printf("\n");
   }
@@ -55,18 +59,23 @@ void run(const FeaturesArguments& arguments) {
   if (networks.features.empty() && networks.perceptual.empty()) {
     throw InputError("no network: give --features, --lpips or --inception");
   }
-  const train::PackageFile population = train::open_package(arguments.population, PackageKind::kPopulation);
+  const train::PackageFile population =
+      train::open_package(arguments.population, PackageKind::kPopulation);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   std::optional<train::PackageFile> motion;
   evaluate::RetrievalOptions options = arguments.options;
   if (!arguments.motion.empty()) {
     motion.emplace(train::open_package(arguments.motion, PackageKind::kMotion));
-    throw_if_error(check_motion_fits_body(motion->package.motion(), body.package.body()), arguments.motion);
+    throw_if_error(check_motion_fits_body(motion->package.motion(), body.package.body()),
+                   arguments.motion);
     options.motion = &motion->package.motion();
   }
-  nlohmann::json report{{"command", train::current_command()},  {"commit", train::current_commit()},
-                        {"machine", train::describe_machine()}, {"date", train::utc_now()},
-                        {"package", arguments.population},      {"package_hash", format_hash(population.package.content_hash())}};
+  nlohmann::json report{{"command", train::current_command()},
+                        {"commit", train::current_commit()},
+                        {"machine", train::describe_machine()},
+                        {"date", train::utc_now()},
+                        {"package", arguments.population},
+                        {"package_hash", format_hash(population.package.content_hash())}};
   report.update(evaluate::evaluate_networks(population.package, body.package, networks, options));
   train::write_json(arguments.output, report);
   if (!options.quiet) print_report(report);
@@ -77,19 +86,31 @@ void run(const FeaturesArguments& arguments) {
 void add_evaluate_features_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<FeaturesArguments>();
   arguments->options.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
-  CLI::App* command = evaluate.add_subcommand("features", "How well networks find people again in other poses, against chance and pixels");
-  command->add_option("POPULATION", arguments->population, "Population package; its held-out members are judged by")->required();
+  CLI::App* command = evaluate.add_subcommand(
+      "features", "How well networks find people again in other poses, against chance and pixels");
+  command
+      ->add_option("POPULATION", arguments->population,
+                   "Population package; its held-out members are judged by")
+      ->required();
   command->add_option("--body", arguments->body, "Body package of its members")->required();
-  command->add_option("--features", arguments->files.features, "figurine-features (figurine-train features)");
-  command->add_option("--lpips", arguments->files.lpips, "AlexNet with LPIPS' weights, .npz or TorchScript (docs/features.md)");
-  command->add_option("--inception", arguments->files.inception, "Inception for FID and KID, TorchScript (docs/features.md)");
-  command->add_option("--motion", arguments->motion, "Motion package whose poses are drawn (default: golden poses of members)");
-  command->add_option("--first-pose", arguments->options.first_pose, "Of the fixed poses (default 8: behind those of features)")
+  command->add_option("--features", arguments->files.features,
+                      "figurine-features (figurine-train features)");
+  command->add_option("--lpips", arguments->files.lpips,
+                      "AlexNet with LPIPS' weights, .npz or TorchScript (docs/features.md)");
+  command->add_option("--inception", arguments->files.inception,
+                      "Inception for FID and KID, TorchScript (docs/features.md)");
+  command->add_option("--motion", arguments->motion,
+                      "Motion package whose poses are drawn (default: golden poses of members)");
+  command
+      ->add_option("--first-pose", arguments->options.first_pose,
+                   "Of the fixed poses (default 8: behind those of features)")
       ->check(CLI::Range(0, 64));
   command->add_option("--poses", arguments->options.poses, "Default 3")->check(CLI::Range(2, 64));
-  command->add_option("--views", arguments->options.views, "Of every pose (default 3)")->check(CLI::Range(2, 64));
+  command->add_option("--views", arguments->options.views, "Of every pose (default 3)")
+      ->check(CLI::Range(2, 64));
   command->add_option("-o,--output", arguments->output, "Report to write, JSON")->required();
-  command->add_option("--threads", arguments->options.threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->add_option("--threads", arguments->options.threads, "Default: all cores")
+      ->check(CLI::Range(1, 256));
   command->add_flag("--quiet", arguments->options.quiet, "No progress, no summary");
   command->callback([arguments] { run(*arguments); });
 }

@@ -38,34 +38,42 @@ void check_name(const char* option, const std::string& path) {
 }
 
 void save_sheet(const std::string& path, const ports::ImageU8& sheet) {
-  throw_if_error(ports::write_file_atomically(path, evaluate::encode_sheet(sheet, kMaxSheetBytes)), "cannot save");
+  throw_if_error(ports::write_file_atomically(path, evaluate::encode_sheet(sheet, kMaxSheetBytes)),
+                 "cannot save");
 }
 
 double number(const nlohmann::json& value) { return value.is_number() ? value.get<double>() : NAN; }
 
 void print_distances(const nlohmann::json& distances) {
-  for (const auto& [title, key] : {std::pair{"weights", "weights"}, std::pair{"pictures", "pictures"}}) {
+  for (const auto& [title, key] :
+       {std::pair{"weights", "weights"}, std::pair{"pictures", "pictures"}}) {
     std::printf("nearest training member in %-9s", title);
     for (const char* split : {"train", "validation", "test"}) {
-      const nlohmann::json& quantiles = distances.at(key).at(std::string(split) + "_nearest_quantiles");
+      const nlohmann::json& quantiles =
+          distances.at(key).at(std::string(split) + "_nearest_quantiles");
       if (!quantiles.is_null()) std::printf("  %s %.2f", split, number(quantiles.at("50")));
     }
     std::printf("  (%s, medians)\n", distances.at(key).at("unit").get<std::string>().c_str());
   }
-  std::printf("weights against pictures: correlation %.2f, of ranks %.2f\n", number(distances.at("correlation").at("pearson")),
+  std::printf("weights against pictures: correlation %.2f, of ranks %.2f\n",
+              number(distances.at("correlation").at("pearson")),
               number(distances.at("correlation").at("spearman")));
 }
 
 void print_spectrum(const nlohmann::json& spectrum) {
   const auto print = [](const std::string& name, const nlohmann::json& row) {
     const nlohmann::json& needed = row.at("directions_for");
-    std::printf("  %-10s %8d values  %4d directions: 50 %% in %d, 90 %% in %d, 99 %% in %d; participation ratio %.1f\n", name.c_str(),
-                row.at("entries").get<int>(), row.at("directions").get<int>(), needed.at("50").get<int>(), needed.at("90").get<int>(),
-                needed.at("99").get<int>(), number(row.at("participation_ratio")));
+    std::printf(
+        "  %-10s %8d values  %4d directions: 50 %% in %d, 90 %% in %d, 99 %% in %d; participation "
+        "ratio %.1f\n",
+        name.c_str(), row.at("entries").get<int>(), row.at("directions").get<int>(),
+        needed.at("50").get<int>(), needed.at("90").get<int>(), needed.at("99").get<int>(),
+        number(row.at("participation_ratio")));
   };
   std::printf("spectrum of the training members\n");
   print("whole", spectrum.at("whole"));
-  for (const nlohmann::json& token : spectrum.at("tokens")) print(token.at("name").get<std::string>(), token);
+  for (const nlohmann::json& token : spectrum.at("tokens"))
+    print(token.at("name").get<std::string>(), token);
 }
 
 void print_span(const nlohmann::json& span) {
@@ -74,27 +82,31 @@ void print_span(const nlohmann::json& span) {
     return;
   }
   const auto print = [](const std::string& name, const nlohmann::json& row) {
-    std::printf("  %-22s %6.2f dB (worst %6.2f)  variance kept %5.1f %%\n", name.c_str(), number(row.at("span_db")),
-                number(row.at("worst_db")), 100 * number(row.at("variance_kept")));
+    std::printf("  %-22s %6.2f dB (worst %6.2f)  variance kept %5.1f %%\n", name.c_str(),
+                number(row.at("span_db")), number(row.at("worst_db")),
+                100 * number(row.at("variance_kept")));
   };
   std::printf("held-out members replaced, against themselves\n");
   for (const auto& [key, row] : span.at("baselines").items()) print(key, row);
   for (const char* basis : {"per_layer", "whole"}) {
-    for (const nlohmann::json& row : span.at(basis)) print(std::string(basis) + ", rank " + std::to_string(row.at("rank").get<int>()), row);
+    for (const nlohmann::json& row : span.at(basis))
+      print(std::string(basis) + ", rank " + std::to_string(row.at("rank").get<int>()), row);
   }
 }
 
 void print_report(const nlohmann::json& report) {
   for (const auto& [name, summary] : report.at("quality").at("all").items()) {
-    std::printf("%-16s mean %7.3f  worst %7.3f  best %7.3f  deviation %.3f\n", name.c_str(), number(summary.at("mean")),
-                number(summary.at("worst")), number(summary.at("best")), number(summary.at("standard_deviation")));
+    std::printf("%-16s mean %7.3f  worst %7.3f  best %7.3f  deviation %.3f\n", name.c_str(),
+                number(summary.at("mean")), number(summary.at("worst")), number(summary.at("best")),
+                number(summary.at("standard_deviation")));
   }
   print_distances(report.at("distances"));
   print_spectrum(report.at("spectrum"));
   print_span(report.at("span"));
   for (const nlohmann::json& pair : report.at("interpolation").at("pairs")) {
-    std::printf("between %s and %s (%s): high-pass energy of the middle %.2f of the ends'\n", pair.at("a").get<std::string>().c_str(),
-                pair.at("b").get<std::string>().c_str(), pair.at("why").get<std::string>().c_str(),
+    std::printf("between %s and %s (%s): high-pass energy of the middle %.2f of the ends'\n",
+                pair.at("a").get<std::string>().c_str(), pair.at("b").get<std::string>().c_str(),
+                pair.at("why").get<std::string>().c_str(),
                 number(pair.at("middle_highpass_ratio")));
   }
 }
@@ -103,29 +115,38 @@ void run_members(const MembersArguments& arguments) {
   check_name("--wall", arguments.wall);
   check_name("--interpolation", arguments.interpolation);
   check_name("--worst-sheet", arguments.worst_sheet);
-  const train::PackageFile population = train::open_package(arguments.population, PackageKind::kPopulation);
+  const train::PackageFile population =
+      train::open_package(arguments.population, PackageKind::kPopulation);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   std::optional<train::PackageFile> motion;
   if (!arguments.motion.empty()) {
     motion.emplace(train::open_package(arguments.motion, PackageKind::kMotion));
-    throw_if_error(check_motion_fits_body(motion->package.motion(), body.package.body()), arguments.motion);
+    throw_if_error(check_motion_fits_body(motion->package.motion(), body.package.body()),
+                   arguments.motion);
   }
-  const evaluate::MemberSet set(
-      population.package, body.package,
-      {.motion = motion ? &motion->package.motion() : nullptr, .threads = arguments.threads, .quiet = arguments.quiet});
+  const evaluate::MemberSet set(population.package, body.package,
+                                {.motion = motion ? &motion->package.motion() : nullptr,
+                                 .threads = arguments.threads,
+                                 .quiet = arguments.quiet});
   const evaluate::MemberDistances distances(set);
   const std::vector<evaluate::MixedPair> pairs = evaluate::choose_pairs(distances);
-  nlohmann::json report{{"command", train::current_command()},  {"commit", train::current_commit()},
-                        {"machine", train::describe_machine()}, {"date", train::utc_now()},
-                        {"package", arguments.population},      {"package_hash", format_hash(population.package.content_hash())}};
+  nlohmann::json report{{"command", train::current_command()},
+                        {"commit", train::current_commit()},
+                        {"machine", train::describe_machine()},
+                        {"date", train::utc_now()},
+                        {"package", arguments.population},
+                        {"package_hash", format_hash(population.package.content_hash())}};
   report.update(evaluate::evaluate_members(set, distances, pairs, arguments.options));
   // Pictures are drawn before anything is written: what is interrupted leaves nothing.
   std::optional<ports::ImageU8> wall, strip, worst;
-  const std::vector<size_t> worst_members = evaluate::worst_members(population.package.population(), arguments.worst);
+  const std::vector<size_t> worst_members =
+      evaluate::worst_members(population.package.population(), arguments.worst);
   if (!arguments.wall.empty()) wall = evaluate::draw_wall(set);
   if (!arguments.interpolation.empty()) strip = evaluate::draw_mixtures(set, pairs);
   if (!arguments.worst_sheet.empty()) {
-    if (worst_members.empty()) throw InputError(arguments.population + ": --worst-sheet: no member has the quality psnr_pose_db");
+    if (worst_members.empty())
+      throw InputError(arguments.population +
+                       ": --worst-sheet: no member has the quality psnr_pose_db");
     worst = evaluate::draw_close(set, worst_members);
   }
   if (wall) save_sheet(arguments.wall, *wall);
@@ -140,22 +161,30 @@ void run_members(const MembersArguments& arguments) {
 void add_evaluate_members_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<MembersArguments>();
   arguments->threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
-  CLI::App* command = evaluate.add_subcommand("members", "What a population is like: quality, distances, spectrum, span, mixtures");
+  CLI::App* command = evaluate.add_subcommand(
+      "members", "What a population is like: quality, distances, spectrum, span, mixtures");
   command->add_option("POPULATION", arguments->population, "Population package")->required();
   command->add_option("--body", arguments->body, "Body package of its members")->required();
-  command->add_option("--motion", arguments->motion, "Motion package whose poses are drawn (default: golden poses of members)");
+  command->add_option("--motion", arguments->motion,
+                      "Motion package whose poses are drawn (default: golden poses of members)");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON")->required();
   command->add_option("--wall", arguments->wall, "Picture of all members to write, JPEG");
-  command->add_option("--interpolation", arguments->interpolation, "Picture of mixtures of two members to write, JPEG");
-  command->add_option("--worst", arguments->worst, "Members of --worst-sheet, by PSNR on held-out poses (default 10)")
-      ->check(CLI::Range(1, 100));
-  command->add_option("--worst-sheet", arguments->worst_sheet, "Picture of the worst members to write, JPEG");
+  command->add_option("--interpolation", arguments->interpolation,
+                      "Picture of mixtures of two members to write, JPEG");
   command
-      ->add_option("--ranks", arguments->options.ranks,
-                   "Of the bases that held-out members are projected onto, A,B (default: powers of two)")
+      ->add_option("--worst", arguments->worst,
+                   "Members of --worst-sheet, by PSNR on held-out poses (default 10)")
+      ->check(CLI::Range(1, 100));
+  command->add_option("--worst-sheet", arguments->worst_sheet,
+                      "Picture of the worst members to write, JPEG");
+  command
+      ->add_option(
+          "--ranks", arguments->options.ranks,
+          "Of the bases that held-out members are projected onto, A,B (default: powers of two)")
       ->delimiter(',')
       ->check(CLI::PositiveNumber);
-  command->add_option("--threads", arguments->threads, "Default: all cores")->check(CLI::Range(1, 256));
+  command->add_option("--threads", arguments->threads, "Default: all cores")
+      ->check(CLI::Range(1, 256));
   command->add_flag("--quiet", arguments->quiet, "No progress");
   command->callback([arguments] { run_members(*arguments); });
 }

@@ -1,5 +1,5 @@
-// figurine-train: the offline commands. Only this folder catches exceptions: exit 1 bad input, 2 usage, 3 bug, 130 interrupted (state
-// saved).
+// figurine-train: the offline commands. Only this folder catches exceptions: exit 1 bad input, 2
+// usage, 3 bug, 130 interrupted (state saved).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>

@@ -32,7 +32,8 @@ struct MotionOptions {
 void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), "--body");
   const Package package = value_or_throw(Package::open(file.bytes(), options.body), "--body");
-  if (package.kind() != PackageKind::kBody) throw InputError(options.body + ": a " + to_string(package.kind()) + " package, not a body");
+  if (package.kind() != PackageKind::kBody)
+    throw InputError(options.body + ": a " + to_string(package.kind()) + " package, not a body");
 
   const std::filesystem::path path(options.clip);
   const std::string extension = path.extension().string();
@@ -51,62 +52,82 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
 
   if (options.loop_cycles > 0) {
     body::LoopReport loop;
-    clip = body::make_loop(clip, {.cycles = options.loop_cycles, .in_place = options.in_place}, &loop);
-    std::printf("cycle of %u frames from frame %u of the result, gap %.1f degrees\n", loop.length, loop.first_frame,
-                57.29578 * double{loop.gap_rad});
+    clip =
+        body::make_loop(clip, {.cycles = options.loop_cycles, .in_place = options.in_place}, &loop);
+    std::printf("cycle of %u frames from frame %u of the result, gap %.1f degrees\n", loop.length,
+                loop.first_frame, 57.29578 * double{loop.gap_rad});
   }
 
   Provenance provenance;
   provenance.tool = "figurine-train " FIGURINE_VERSION;
-  provenance.settings = {{"command", "motion " + path.filename().string()},
-                         {"body", format_hash(package.content_hash())},
-                         {"start", has_start ? std::to_string(options.start) : "first of the motion"},
-                         {"frames", std::to_string(clip.frame_count)},
-                         {"loop_cycles", std::to_string(options.loop_cycles)},
-                         {"smooth_s", std::to_string(retarget.smooth_s.value_or(extension == ".glb" ? 0 : body::kCaptureSmoothS))}};
-  if (extension == ".glb") provenance.settings.push_back({"animation", std::to_string(retarget.animation)});
+  provenance.settings = {
+      {"command", "motion " + path.filename().string()},
+      {"body", format_hash(package.content_hash())},
+      {"start", has_start ? std::to_string(options.start) : "first of the motion"},
+      {"frames", std::to_string(clip.frame_count)},
+      {"loop_cycles", std::to_string(options.loop_cycles)},
+      {"smooth_s", std::to_string(retarget.smooth_s.value_or(
+                       extension == ".glb" ? 0 : body::kCaptureSmoothS))}};
+  if (extension == ".glb")
+    provenance.settings.push_back({"animation", std::to_string(retarget.animation)});
   provenance.sources = {options.source.empty() ? body::clip_source(options.clip) : options.source};
   const auto bytes = value_or_throw(write_package(clip.view(), provenance), options.output);
   throw_if_error(ports::write_file_atomically(options.output, bytes), "-o");
   std::printf(
-      "%s: %u frames at %g a second, soles in contact %.1f mm from the ground on average (lowest %.1f), largest step of a joint %.1f "
+      "%s: %u frames at %g a second, soles in contact %.1f mm from the ground on average (lowest "
+      "%.1f), largest step of a joint %.1f "
       "degrees, %zu "
       "bytes\n",
-      options.output.c_str(), clip.frame_count, double{clip.frames_per_second}, 1e3 * double{report.mean_contact_m},
-      1e3 * double{report.lowest_sole_m}, 57.29578 * double{report.largest_step_rad}, bytes.size());
+      options.output.c_str(), clip.frame_count, double{clip.frames_per_second},
+      1e3 * double{report.mean_contact_m}, 1e3 * double{report.lowest_sole_m},
+      57.29578 * double{report.largest_step_rad}, bytes.size());
 }
 
 }  // namespace
 
 void add_motion_command(CLI::App& app) {
   auto options = std::make_shared<MotionOptions>();
-  CLI::App* command = app.add_subcommand("motion", "Move a captured clip (.bvh, .npz, .glb) onto a body");
+  CLI::App* command =
+      app.add_subcommand("motion", "Move a captured clip (.bvh, .npz, .glb) onto a body");
   command
       ->add_option("clip", options->clip,
-                   "CLIP.bvh with CMU's joint names, an AMASS-style CLIP.npz, or a glTF CLIP.glb with HumanIK's joint names")
+                   "CLIP.bvh with CMU's joint names, an AMASS-style CLIP.npz, or a glTF CLIP.glb "
+                   "with HumanIK's joint names")
       ->required();
   command->add_option("--body", options->body, "BODY.fgn")->required();
   command->add_option("-o,--output", options->output, "MOTION.fgn")->required();
-  command->add_option("--fps", options->retarget.frames_per_second, "Frames a second of the result")->check(CLI::Range(1.0, 240.0));
-  const CLI::Option* start = command->add_option(
-      "--start", options->start, "First frame of the clip, counted as in the file (GLB: at --fps); default: after the neutral frame");
+  command->add_option("--fps", options->retarget.frames_per_second, "Frames a second of the result")
+      ->check(CLI::Range(1.0, 240.0));
+  const CLI::Option* start =
+      command->add_option("--start", options->start,
+                          "First frame of the clip, counted as in the file (GLB: at --fps); "
+                          "default: after the neutral frame");
   const CLI::Option* frames =
-      command->add_option("--frames", options->frames, "Frames of the result; default: to the end")->check(CLI::PositiveNumber);
+      command->add_option("--frames", options->frames, "Frames of the result; default: to the end")
+          ->check(CLI::PositiveNumber);
   command->add_option("--name", options->retarget.name, "Name of the motion; default: the file's");
   command
-      ->add_option("--smooth", options->retarget.smooth_s, "Standard deviation of the smoothing over time, seconds; default: 0.03, GLB: 0")
+      ->add_option("--smooth", options->retarget.smooth_s,
+                   "Standard deviation of the smoothing over time, seconds; default: 0.03, GLB: 0")
       ->check(CLI::Range(0.0, 0.5));
   command
       ->add_option("--neutral", options->neutral,
-                   "The T-pose is the first frame (default of BVH), the zero pose, or told by the bones' axes (default of GLB)")
+                   "The T-pose is the first frame (default of BVH), the zero pose, or told by the "
+                   "bones' axes (default of GLB)")
       ->check(CLI::IsMember({"first", "zero", "axes"}));
-  command->add_option("--animation", options->retarget.animation, "GLB: which of the file's animations, counted from 0");
-  command->add_option("--up", options->up, "NPZ: the world's up axis")->check(CLI::IsMember({"z", "y"}));
-  CLI::Option* loop = command->add_option("--loop", options->loop_cycles, "Repeat the best gait cycle this often, straight ahead")
+  command->add_option("--animation", options->retarget.animation,
+                      "GLB: which of the file's animations, counted from 0");
+  command->add_option("--up", options->up, "NPZ: the world's up axis")
+      ->check(CLI::IsMember({"z", "y"}));
+  CLI::Option* loop = command
+                          ->add_option("--loop", options->loop_cycles,
+                                       "Repeat the best gait cycle this often, straight ahead")
                           ->check(CLI::Range(1u, 1000u));
   command->add_flag("--in-place", options->in_place, "With --loop: walk on the spot")->needs(loop);
-  command->add_option("--source", options->source, "Provenance line: where the clip is from and under which terms");
-  command->callback([options, start, frames] { run_motion(*options, start->count() > 0, frames->count() > 0); });
+  command->add_option("--source", options->source,
+                      "Provenance line: where the clip is from and under which terms");
+  command->callback(
+      [options, start, frames] { run_motion(*options, start->count() > 0, frames->count() > 0); });
 }
 
 }  // namespace figurine::cli

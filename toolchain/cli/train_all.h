@@ -1,4 +1,5 @@
-// figurine-train avatar --all: one training per identity of a folder, several at a time, and a table of what became of each.
+// figurine-train avatar --all: one training per identity of a folder, several at a time, and a
+// table of what became of each.
 #pragma once
 
 #include <functional>
@@ -15,7 +16,9 @@ struct TrainAllOptions {
   bool quiet = false;
 };
 
-// Trains every identity by request_of(its name). Throws InputError when all have ended and some failed, Interrupted after Ctrl-C.
-void train_all(const TrainAllOptions& options, const std::function<train::TrainRequest(const std::string&)>& request_of);
+// Trains every identity by request_of(its name). Throws InputError when all have ended and some
+// failed, Interrupted after Ctrl-C.
+void train_all(const TrainAllOptions& options,
+               const std::function<train::TrainRequest(const std::string&)>& request_of);
 
 }  // namespace figurine::cli

@@ -42,8 +42,8 @@ json read_json(const std::string& path) {
   return value;
 }
 
-// A pickle that holds one float, and nothing else: protocol and frame headers, the number, the stop. A pickle is a program; this is no
-// interpreter.
+// A pickle that holds one float, and nothing else: protocol and frame headers, the number, the
+// stop. A pickle is a program; this is no interpreter.
 double read_pickled_float(const std::string& path) {
   const ports::MappedFile file = map_file(path);
   const auto* p = reinterpret_cast<const uint8_t*>(file.bytes().data());
@@ -68,7 +68,8 @@ double read_pickled_float(const std::string& path) {
       for (int i = 0; i < 8; ++i) bits = bits << 8 | *p++;
       value = std::bit_cast<double>(bits);
     } else if (opcode == 'F' && !value) {  // FLOAT, a line of text
-      const auto* line_end = static_cast<const uint8_t*>(std::memchr(p, '\n', static_cast<size_t>(end - p)));
+      const auto* line_end =
+          static_cast<const uint8_t*>(std::memchr(p, '\n', static_cast<size_t>(end - p)));
       if (line_end == nullptr) throw InputError(path + ": pickle ends early");
       const std::string text(p, line_end);
       char* stop = nullptr;
@@ -78,10 +79,12 @@ double read_pickled_float(const std::string& path) {
     } else if (opcode == '.' && value) {
       break;
     } else {
-      throw InputError(path + ": holds something else than one pickled float (opcode " + std::to_string(opcode) + ")");
+      throw InputError(path + ": holds something else than one pickled float (opcode " +
+                       std::to_string(opcode) + ")");
     }
   }
-  if (!std::isfinite(*value) || *value <= 0) throw InputError(path + ": camera scale must be positive and finite");
+  if (!std::isfinite(*value) || *value <= 0)
+    throw InputError(path + ": camera scale must be positive and finite");
   return *value;
 }
 
@@ -94,7 +97,8 @@ std::optional<uint32_t> leading_number(const std::string& name) {
 }
 
 // Files of a folder with one extension, by their leading number.
-std::map<uint32_t, std::string> numbered_files(const std::string& directory, const std::string& extension) {
+std::map<uint32_t, std::string> numbered_files(const std::string& directory,
+                                               const std::string& extension) {
   std::map<uint32_t, std::string> files;
   std::error_code error;
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
@@ -102,13 +106,15 @@ std::map<uint32_t, std::string> numbered_files(const std::string& directory, con
     if (!name.ends_with(extension)) continue;
     const std::optional<uint32_t> number = leading_number(name);
     if (!number) continue;
-    if (!files.emplace(*number, name).second) throw InputError(directory + ": two files of number " + std::to_string(*number));
+    if (!files.emplace(*number, name).second)
+      throw InputError(directory + ": two files of number " + std::to_string(*number));
   }
   if (error) throw InputError(directory + ": " + error.message());
   return files;
 }
 
-Camera read_camera(const JsonField& extrinsics, const std::vector<double>& intrinsics, double scale, ImageSize size) {
+Camera read_camera(const JsonField& extrinsics, const std::vector<double>& intrinsics, double scale,
+                   ImageSize size) {
   Camera camera;
   camera.width_px = size.width_px;
   camera.height_px = size.height_px;
@@ -119,7 +125,8 @@ Camera read_camera(const JsonField& extrinsics, const std::vector<double>& intri
   const std::vector<double> rotation = extrinsics["rotation"].numbers(9);
   const std::vector<double> translation = extrinsics["translation"].numbers(3);
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) camera.view_from_world[row * 4 + column] = static_cast<float>(rotation[row * 3 + column]);
+    for (int column = 0; column < 3; ++column)
+      camera.view_from_world[row * 4 + column] = static_cast<float>(rotation[row * 3 + column]);
     camera.view_from_world[row * 4 + 3] = static_cast<float>(translation[row] * scale);
   }
   throw_if_error(validate_camera(camera), extrinsics.where());
@@ -134,12 +141,15 @@ std::array<double, 4> quaternion_from_rotation_vector(const double* v) {
 }
 
 std::array<double, 4> multiply(const std::array<double, 4>& a, const std::array<double, 4>& b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+          a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+          a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
 }
 
 std::array<double, 3> rotate(const std::array<double, 4>& q, const std::array<double, 3>& v) {
-  const std::array<double, 4> r = multiply(multiply(q, {0, v[0], v[1], v[2]}), {q[0], -q[1], -q[2], -q[3]});
+  const std::array<double, 4> r =
+      multiply(multiply(q, {0, v[0], v[1], v[2]}), {q[0], -q[1], -q[2], -q[3]});
   return {r[1], r[2], r[3]};
 }
 
@@ -164,11 +174,13 @@ SmplxPose read_smplx(const std::string& path) {
   return pose;
 }
 
-// World point = R(Rh) (posed by `poses`, root at its rest position) + Th: a rotation about the origin. Our root turns about its own joint
-// r:
+// World point = R(Rh) (posed by `poses`, root at its rest position) + Th: a rotation about the
+// origin. Our root turns about its own joint r:
 //   R (x - r) + r + t = R x + Th   =>   t = R r - r + Th.
-// Hands stay at rest: the 6 + 6 numbers are coefficients of SMPL-X's hand components, which the data set does not hold.
-void set_pose(const SmplxPose& smplx, const std::array<double, 3>& root_rest_m, CaptureFrame& frame) {
+// Hands stay at rest: the 6 + 6 numbers are coefficients of SMPL-X's hand components, which the
+// data set does not hold.
+void set_pose(const SmplxPose& smplx, const std::array<double, 3>& root_rest_m,
+              CaptureFrame& frame) {
   frame.rotations.assign(kSmplxJoints * 4, 0.0f);
   for (uint32_t j = 0; j < kSmplxJoints; ++j) frame.rotations[j * 4] = 1;
   const auto set = [&](uint32_t joint, const std::array<double, 4>& q) {
@@ -176,16 +188,22 @@ void set_pose(const SmplxPose& smplx, const std::array<double, 3>& root_rest_m, 
   };
   set(0, multiply(smplx.rotation, quaternion_from_rotation_vector(&smplx.poses[0])));
   for (uint32_t j = 1; j < 22; ++j) set(j, quaternion_from_rotation_vector(&smplx.poses[j * 3]));
-  for (uint32_t j = 0; j < 3; ++j) set(22 + j, quaternion_from_rotation_vector(&smplx.poses[78 + j * 3]));  // jaw, left eye, right eye
+  for (uint32_t j = 0; j < 3; ++j)
+    set(22 + j,
+        quaternion_from_rotation_vector(&smplx.poses[78 + j * 3]));  // jaw, left eye, right eye
   const std::array<double, 3> turned = rotate(smplx.rotation, root_rest_m);
-  for (int i = 0; i < 3; ++i) frame.root_translation_m[i] = static_cast<float>(turned[i] - root_rest_m[i] + smplx.translation_m[i]);
+  for (int i = 0; i < 3; ++i)
+    frame.root_translation_m[i] =
+        static_cast<float>(turned[i] - root_rest_m[i] + smplx.translation_m[i]);
 }
 
 std::array<double, 3> root_rest_position(const Body& body, const std::vector<float>& shape) {
-  std::array<double, 3> root{body.joint_position_m[0], body.joint_position_m[1], body.joint_position_m[2]};
+  std::array<double, 3> root{body.joint_position_m[0], body.joint_position_m[1],
+                             body.joint_position_m[2]};
   const size_t used = std::min<size_t>(shape.size(), body.shape_count());
   for (size_t s = 0; s < used; ++s) {
-    for (int i = 0; i < 3; ++i) root[i] += double{shape[s]} * body.joint_shape_basis_m[s * body.joint_count() * 3 + i];
+    for (int i = 0; i < 3; ++i)
+      root[i] += double{shape[s]} * body.joint_shape_basis_m[s * body.joint_count() * 3 + i];
   }
   return root;
 }
@@ -225,16 +243,19 @@ const char* to_string(Role role) {
 Split default_split(uint32_t frame_count, uint32_t camera_count) {
   Split split;
   split.frames.assign(frame_count, FrameSplit::kTrain);
-  const uint32_t block = frame_count < 2 * kBlockFrames ? 0 : std::min(kBlockFrames, frame_count / 6);
+  const uint32_t block =
+      frame_count < 2 * kBlockFrames ? 0 : std::min(kBlockFrames, frame_count / 6);
   const uint32_t first = frame_count * 2 / 3;
   for (uint32_t i = 0; i < block; ++i) split.frames[first + i] = FrameSplit::kBlock;
   uint32_t count = 0;
   for (FrameSplit& frame : split.frames) {
-    if (frame == FrameSplit::kTrain && ++count % kInterleavedStride == 0) frame = FrameSplit::kInterleaved;
+    if (frame == FrameSplit::kTrain && ++count % kInterleavedStride == 0)
+      frame = FrameSplit::kInterleaved;
   }
   split.held_out_camera.assign(camera_count, false);
   const uint32_t held_out = std::min(kHeldOutCameras, camera_count / 6);
-  for (uint32_t i = 0; i < held_out; ++i) split.held_out_camera[(2 * i + 1) * camera_count / (2 * held_out)] = true;
+  for (uint32_t i = 0; i < held_out; ++i)
+    split.held_out_camera[(2 * i + 1) * camera_count / (2 * held_out)] = true;
   return split;
 }
 
@@ -251,7 +272,9 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
   const JsonField about(own_json, own_path + ": ");
   if (own) {
     if (about["version"].whole() != 1) about["version"].fail("unknown version; this build reads 1");
-    if (!about["complete"].boolean()) throw InputError(own_path + ": complete: the capture was interrupted; finish it with --resume");
+    if (!about["complete"].boolean())
+      throw InputError(own_path +
+                       ": complete: the capture was interrupted; finish it with --resume");
     set.seed_ = about["seed"].whole();
     set.body_name_ = about["body"]["name"].text();
     set.body_hash_ = about["body"]["hash"].text();
@@ -261,23 +284,28 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
     if (background != "black") about["background"].fail("unknown background '" + background + "'");
     set.composited_on_black_ = true;
     if (!options.body_hash.empty() && options.body_hash != set.body_hash_) {
-      about["body"]["hash"].fail("captured with body " + set.body_hash_ + ", but the given body is " + options.body_hash);
+      about["body"]["hash"].fail("captured with body " + set.body_hash_ +
+                                 ", but the given body is " + options.body_hash);
     }
   } else if (options.body == nullptr) {
-    throw InputError(directory + ": has no figurine.json, so its poses need a body (the pelvis' rest position)");
+    throw InputError(
+        directory + ": has no figurine.json, so its poses need a body (the pelvis' rest position)");
   }
   if (options.body != nullptr && options.body->joint_count() != kSmplxJoints) {
-    throw InputError(directory + ": needs a body of 55 joints, the given one has " + std::to_string(options.body->joint_count()));
+    throw InputError(directory + ": needs a body of 55 joints, the given one has " +
+                     std::to_string(options.body->joint_count()));
   }
 
   // Cameras. The key is "NUMBER_NAME.png".
   const std::string intrinsics_path = (root / "camera_intrinsics.json").string();
   const json intrinsics_json = read_json(intrinsics_path);
-  const std::vector<double> intrinsics = JsonField(intrinsics_json, intrinsics_path + ": ")["intrinsics"].numbers(9);
+  const std::vector<double> intrinsics =
+      JsonField(intrinsics_json, intrinsics_path + ": ")["intrinsics"].numbers(9);
   const double scale = read_pickled_float((root / "camera_scale.pkl").string());
   const std::string extrinsics_path = (root / "camera_extrinsics.json").string();
   const json extrinsics_json = read_json(extrinsics_path);
-  if (!extrinsics_json.is_object()) throw InputError(extrinsics_path + ": not an object of cameras");
+  if (!extrinsics_json.is_object())
+    throw InputError(extrinsics_path + ": not an object of cameras");
   std::map<uint32_t, std::pair<std::string, std::string>> ordered;  // number -> key, name
   for (const auto& [key, value] : extrinsics_json.items()) {
     const std::optional<uint32_t> number = leading_number(key);
@@ -287,7 +315,8 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
     }
     std::string name = key.substr(underscore + 1);
     if (name.ends_with(".png")) name.resize(name.size() - 4);
-    if (name.find('/') != std::string::npos || name == "..") throw InputError(extrinsics_path + ": " + key + ": not a folder's name");
+    if (name.find('/') != std::string::npos || name == "..")
+      throw InputError(extrinsics_path + ": " + key + ": not a folder's name");
     if (!ordered.emplace(*number, std::pair(key, name)).second)
       throw InputError(extrinsics_path + ": two cameras of number " + std::to_string(*number));
   }
@@ -307,12 +336,15 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
     const ImageSize size = decode_jpeg_size(map_file(first).bytes(), first);
     CaptureCamera camera;
     camera.name = name;
-    camera.camera = read_camera(JsonField(extrinsics_json, extrinsics_path + ": ")[key], intrinsics, scale, size);
-    // The images are half the size that the intrinsics speak of: a principal point outside the image shows data of another size.
-    if (!(camera.camera.cx_px > 0 && camera.camera.cx_px < size.width_px && camera.camera.cy_px > 0 &&
-          camera.camera.cy_px < size.height_px)) {
-      throw InputError(intrinsics_path + ": intrinsics: principal point, halved, is outside the images of " + name + " (" +
-                       std::to_string(size.width_px) + "x" + std::to_string(size.height_px) + ")");
+    camera.camera = read_camera(JsonField(extrinsics_json, extrinsics_path + ": ")[key], intrinsics,
+                                scale, size);
+    // The images are half the size that the intrinsics speak of: a principal point outside the
+    // image shows data of another size.
+    if (!(camera.camera.cx_px > 0 && camera.camera.cx_px < size.width_px &&
+          camera.camera.cy_px > 0 && camera.camera.cy_px < size.height_px)) {
+      throw InputError(
+          intrinsics_path + ": intrinsics: principal point, halved, is outside the images of " +
+          name + " (" + std::to_string(size.width_px) + "x" + std::to_string(size.height_px) + ")");
     }
     set.cameras_.push_back(std::move(camera));
     camera_numbers.push_back(number);
@@ -325,7 +357,8 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
     for (const JsonField& frame : about["frames"].items()) {
       const uint64_t number = frame["number"].whole();
       if (number == 0 || number > 999'999'999) frame["number"].fail("out of range");
-      if (!own_frames.emplace(static_cast<uint32_t>(number), frame).second) frame["number"].fail("stands twice");
+      if (!own_frames.emplace(static_cast<uint32_t>(number), frame).second)
+        frame["number"].fail("stands twice");
     }
   }
   for (const auto& [number, file] : images[0]) {
@@ -337,7 +370,8 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
       frame.split = parse_split(field["split"]);
       const std::vector<double> translation = field["root_translation_m"].numbers(3);
       for (int i = 0; i < 3; ++i) frame.root_translation_m[i] = static_cast<float>(translation[i]);
-      for (double q : field["rotations"].numbers(kSmplxJoints * 4)) frame.rotations.push_back(static_cast<float>(q));
+      for (double q : field["rotations"].numbers(kSmplxJoints * 4))
+        frame.rotations.push_back(static_cast<float>(q));
       throw_if_error(validate_pose(frame.pose(), kSmplxJoints), field["rotations"].where());
     } else if (own) {
       ++set.frames_without_pose_;
@@ -346,22 +380,24 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
       const uint32_t index = number / kFrameStep;
       const std::string path =
           (root / "smplx" / "smpl" /
-           (std::string(6 - std::min<size_t>(6, std::to_string(index - 1).size()), '0') + std::to_string(index - 1) + ".json"))
+           (std::string(6 - std::min<size_t>(6, std::to_string(index - 1).size()), '0') +
+            std::to_string(index - 1) + ".json"))
               .string();
       if (number % kFrameStep != 0 || index == 0 || !fs::exists(path)) {
         ++set.frames_without_pose_;
         continue;
       }
       const SmplxPose smplx = read_smplx(path);
-      if (set.shape_.empty()) set.shape_ = smplx.shapes;  // one person: the first frame's shape is everyone's
+      if (set.shape_.empty())
+        set.shape_ = smplx.shapes;  // one person: the first frame's shape is everyone's
       set_pose(smplx, root_rest_position(*options.body, set.shape_), frame);
     }
     set.frames_.push_back(std::move(frame));
   }
   if (set.frames_.empty()) throw InputError(directory + ": no frame has both image and pose");
   if (own && set.frames_.size() != own_frames.size()) {
-    throw InputError(own_path + ": frames: names " + std::to_string(own_frames.size()) + ", but only " +
-                     std::to_string(set.frames_.size()) + " have images");
+    throw InputError(own_path + ": frames: names " + std::to_string(own_frames.size()) +
+                     ", but only " + std::to_string(set.frames_.size()) + " have images");
   }
 
   for (size_t c = 0; c < set.cameras_.size(); ++c) {
@@ -369,7 +405,8 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
     set.mask_files_.emplace_back();
     for (const CaptureFrame& frame : set.frames_) {
       const auto missing = [&](const char* folder) {
-        throw InputError((root / folder / set.cameras_[c].name).string() + ": frame " + frame_label(frame.number) + ": missing");
+        throw InputError((root / folder / set.cameras_[c].name).string() + ": frame " +
+                         frame_label(frame.number) + ": missing");
       };
       const auto image = images[c].find(frame.number);
       const auto mask = masks[c].find(frame.number);
@@ -385,18 +422,22 @@ Dataset Dataset::open(const std::string& directory, const DatasetOptions& option
     std::set<std::string> held_out;
     for (const JsonField& name : about["held_out_cameras"].items()) held_out.insert(name.text());
     for (CaptureCamera& camera : set.cameras_) camera.held_out = held_out.erase(camera.name) != 0;
-    if (!held_out.empty()) about["held_out_cameras"].fail("no camera is called '" + *held_out.begin() + "'");
+    if (!held_out.empty())
+      about["held_out_cameras"].fail("no camera is called '" + *held_out.begin() + "'");
   } else {
-    const Split split = default_split(static_cast<uint32_t>(set.frames_.size()), static_cast<uint32_t>(set.cameras_.size()));
+    const Split split = default_split(static_cast<uint32_t>(set.frames_.size()),
+                                      static_cast<uint32_t>(set.cameras_.size()));
     for (size_t f = 0; f < set.frames_.size(); ++f) set.frames_[f].split = split.frames[f];
-    for (size_t c = 0; c < set.cameras_.size(); ++c) set.cameras_[c].held_out = split.held_out_camera[c];
+    for (size_t c = 0; c < set.cameras_.size(); ++c)
+      set.cameras_[c].held_out = split.held_out_camera[c];
   }
   return set;
 }
 
 Role Dataset::role(size_t frame, size_t camera) const {
   const FrameSplit split = frames_.at(frame).split;
-  if (cameras_.at(camera).held_out) return split == FrameSplit::kTrain ? Role::kHeldOutView : Role::kHeldOutViewAndPose;
+  if (cameras_.at(camera).held_out)
+    return split == FrameSplit::kTrain ? Role::kHeldOutView : Role::kHeldOutViewAndPose;
   switch (split) {
     case FrameSplit::kTrain:
       return Role::kTrain;
@@ -409,19 +450,24 @@ Role Dataset::role(size_t frame, size_t camera) const {
 }
 
 std::string Dataset::image_path(size_t frame, size_t camera) const {
-  return (fs::path(directory_) / "images_lr" / cameras_.at(camera).name / image_files_.at(camera).at(frame)).string();
+  return (fs::path(directory_) / "images_lr" / cameras_.at(camera).name /
+          image_files_.at(camera).at(frame))
+      .string();
 }
 
 std::string Dataset::mask_path(size_t frame, size_t camera) const {
-  return (fs::path(directory_) / "fmask_lr" / cameras_.at(camera).name / mask_files_.at(camera).at(frame)).string();
+  return (fs::path(directory_) / "fmask_lr" / cameras_.at(camera).name /
+          mask_files_.at(camera).at(frame))
+      .string();
 }
 
 CaptureImage Dataset::load_image(size_t frame, size_t camera) const {
   const Camera& expected = cameras_.at(camera).camera;
   const auto check_size = [&](const std::string& path, const ports::ImageU8& image) {
     if (image.width_px == expected.width_px && image.height_px == expected.height_px) return;
-    throw InputError(path + ": is " + std::to_string(image.width_px) + "x" + std::to_string(image.height_px) +
-                     ", the camera's images are " + std::to_string(expected.width_px) + "x" + std::to_string(expected.height_px));
+    throw InputError(path + ": is " + std::to_string(image.width_px) + "x" +
+                     std::to_string(image.height_px) + ", the camera's images are " +
+                     std::to_string(expected.width_px) + "x" + std::to_string(expected.height_px));
   };
   const std::string colour_path = image_path(frame, camera);
   ports::ImageU8 colour = decode_jpeg(map_file(colour_path).bytes(), colour_path);
@@ -437,10 +483,13 @@ CaptureImage Dataset::load_image(size_t frame, size_t camera) const {
   CaptureImage image{expected.width_px, expected.height_px, std::move(colour.pixels), {}};
   const size_t count = size_t{image.width_px} * image.height_px;
   image.alpha.resize(count);
-  for (size_t i = 0; i < count; ++i) image.alpha[i] = mask.pixels[i * mask.channels];  // grey, or any channel of a grey RGB mask
+  for (size_t i = 0; i < count; ++i)
+    image.alpha[i] = mask.pixels[i * mask.channels];  // grey, or any channel of a grey RGB mask
   if (!composited_on_black_) {
     for (size_t i = 0; i < count; ++i) {
-      for (int c = 0; c < 3; ++c) image.rgb[i * 3 + c] = static_cast<uint8_t>((image.rgb[i * 3 + c] * image.alpha[i] + 127) / 255);
+      for (int c = 0; c < 3; ++c)
+        image.rgb[i * 3 + c] =
+            static_cast<uint8_t>((image.rgb[i * 3 + c] * image.alpha[i] + 127) / 255);
     }
   }
   return image;

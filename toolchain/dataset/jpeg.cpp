@@ -14,8 +14,8 @@
 namespace figurine::dataset {
 namespace {
 
-// libjpeg reports errors by a callback that must not return; longjmp is its documented way out. No C++ object may live across the jump, so
-// the functions that call setjmp touch plain data alone.
+// libjpeg reports errors by a callback that must not return; longjmp is its documented way out. No
+// C++ object may live across the jump, so the functions that call setjmp touch plain data alone.
 struct JpegError {
   jpeg_error_mgr manager;
   jmp_buf jump;
@@ -35,9 +35,10 @@ void keep_warning(j_common_ptr info, int level) {
   if (error->manager.num_warnings++ == 0) error->manager.format_message(info, error->message);
 }
 
-// Reads the header, then calls prepare(header) for a buffer of width * height * 3 bytes; a null buffer stops there.
-bool run_decoder(std::span<const std::byte> bytes, ImageSize* header, uint8_t* (*prepare)(void*, const ImageSize&), void* context,
-                 JpegError* error) {
+// Reads the header, then calls prepare(header) for a buffer of width * height * 3 bytes; a null
+// buffer stops there.
+bool run_decoder(std::span<const std::byte> bytes, ImageSize* header,
+                 uint8_t* (*prepare)(void*, const ImageSize&), void* context, JpegError* error) {
   jpeg_decompress_struct info;
   std::memset(&info, 0, sizeof info);
   info.err = jpeg_std_error(&error->manager);
@@ -49,7 +50,8 @@ bool run_decoder(std::span<const std::byte> bytes, ImageSize* header, uint8_t* (
     return false;
   }
   jpeg_create_decompress(&info);
-  jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<unsigned long>(bytes.size()));
+  jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()),
+               static_cast<unsigned long>(bytes.size()));
   jpeg_read_header(&info, TRUE);
   header->width_px = info.image_width;
   header->height_px = info.image_height;
@@ -90,13 +92,17 @@ ports::ImageU8 decode(std::span<const std::byte> bytes, bool header_only, const 
   };
   const bool sound = run_decoder(bytes, &header, prepare, &target, &error);
   if (!sound) throw InputError(name + ": damaged JPEG: " + error.message);
-  if (target.too_large) throw InputError(name + ": image larger than " + std::to_string(kMaxImageSide) + " pixels a side");
+  if (target.too_large)
+    throw InputError(name + ": image larger than " + std::to_string(kMaxImageSide) +
+                     " pixels a side");
   return std::move(target.image);
 }
 
 }  // namespace
 
-ports::ImageU8 decode_jpeg(std::span<const std::byte> bytes, const std::string& name) { return decode(bytes, false, name); }
+ports::ImageU8 decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
+  return decode(bytes, false, name);
+}
 
 ImageSize decode_jpeg_size(std::span<const std::byte> bytes, const std::string& name) {
   const ports::ImageU8 header = decode(bytes, true, name);
@@ -108,7 +114,8 @@ std::vector<std::byte> encode_jpeg(const ports::ImageU8& image, int quality) {
   jpeg_compress_struct info;
   std::memset(&info, 0, sizeof info);
   jpeg_error_mgr error;
-  info.err = jpeg_std_error(&error);  // an error here is out of memory: the default handler ends the program
+  info.err = jpeg_std_error(
+      &error);  // an error here is out of memory: the default handler ends the program
   jpeg_create_compress(&info);
   unsigned char* buffer = nullptr;
   unsigned long size = 0;
@@ -121,7 +128,8 @@ std::vector<std::byte> encode_jpeg(const ports::ImageU8& image, int quality) {
   jpeg_set_quality(&info, quality, TRUE);
   info.dct_method = JDCT_ISLOW;
   info.optimize_coding = TRUE;
-  for (int c = 0; c < info.num_components; ++c) info.comp_info[c].h_samp_factor = info.comp_info[c].v_samp_factor = 1;
+  for (int c = 0; c < info.num_components; ++c)
+    info.comp_info[c].h_samp_factor = info.comp_info[c].v_samp_factor = 1;
   jpeg_start_compress(&info, TRUE);
   while (info.next_scanline < info.image_height) {
     JSAMPROW row = const_cast<uint8_t*>(image.at(0, info.next_scanline));

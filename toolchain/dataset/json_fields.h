@@ -1,4 +1,5 @@
-// Reads JSON from outside: every access says which file and field was wrong, and no number that is not finite gets through.
+// Reads JSON from outside: every access says which file and field was wrong, and no number that is
+// not finite gets through.
 #pragma once
 
 #include <cmath>
@@ -13,9 +14,12 @@ namespace figurine::dataset {
 // One value and the words for where it stands: "FILE: a.b".
 class JsonField {
  public:
-  JsonField(const nlohmann::json& value, std::string where) : value_(value), where_(std::move(where)) {}
+  JsonField(const nlohmann::json& value, std::string where)
+      : value_(value), where_(std::move(where)) {}
 
-  [[noreturn]] void fail(const std::string& reason) const { throw InputError(where_ + ": " + reason); }
+  [[noreturn]] void fail(const std::string& reason) const {
+    throw InputError(where_ + ": " + reason);
+  }
 
   bool has(const char* key) const { return value_.is_object() && value_.contains(key); }
 
@@ -30,7 +34,8 @@ class JsonField {
   std::vector<double> numbers(size_t count = 0) const {
     std::vector<double> out;
     append_numbers(value_, out);
-    if (count != 0 && out.size() != count) fail("has " + std::to_string(out.size()) + " numbers, expected " + std::to_string(count));
+    if (count != 0 && out.size() != count)
+      fail("has " + std::to_string(out.size()) + " numbers, expected " + std::to_string(count));
     return out;
   }
 
@@ -54,7 +59,8 @@ class JsonField {
   std::vector<JsonField> items() const {
     if (!value_.is_array()) fail("not a list");
     std::vector<JsonField> out;
-    for (size_t i = 0; i < value_.size(); ++i) out.push_back({value_[i], where_ + "[" + std::to_string(i) + "]"});
+    for (size_t i = 0; i < value_.size(); ++i)
+      out.push_back({value_[i], where_ + "[" + std::to_string(i) + "]"});
     return out;
   }
 
@@ -62,7 +68,9 @@ class JsonField {
   const std::string& where() const { return where_; }
 
  private:
-  std::string inside(const std::string& key) const { return where_ + (where_.ends_with(": ") ? "" : ".") + key; }
+  std::string inside(const std::string& key) const {
+    return where_ + (where_.ends_with(": ") ? "" : ".") + key;
+  }
 
   void append_numbers(const nlohmann::json& value, std::vector<double>& out) const {
     if (value.is_array()) {

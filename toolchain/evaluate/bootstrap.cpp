@@ -25,7 +25,8 @@ Items all_items(size_t samples, size_t references) {
   return items;
 }
 
-BootstrapInterval bootstrap_interval(size_t samples, size_t references, const std::function<double(const Items&)>& statistic,
+BootstrapInterval bootstrap_interval(size_t samples, size_t references,
+                                     const std::function<double(const Items&)>& statistic,
                                      const BootstrapOptions& options) {
   if (samples == 0 || references == 0) throw InputError("bootstrap: no samples or no references");
   if (options.replicates == 0 || !(options.confidence > 0 && options.confidence < 1)) {
@@ -34,13 +35,16 @@ BootstrapInterval bootstrap_interval(size_t samples, size_t references, const st
   std::vector<double> values(options.replicates);
   for (size_t i = 0; i < values.size(); ++i) {
     const auto item = static_cast<uint32_t>(i);
-    values[i] = statistic({resampled(RandomStream(options.seed, RandomUse::kResampledSamples, item), samples),
-                           resampled(RandomStream(options.seed, RandomUse::kResampledReferences, item), references)});
+    values[i] = statistic(
+        {resampled(RandomStream(options.seed, RandomUse::kResampledSamples, item), samples),
+         resampled(RandomStream(options.seed, RandomUse::kResampledReferences, item), references)});
   }
   const double estimate = statistic(all_items(samples, references));
   const Summary summary = summarise(values);
-  const double bias = summary.mean - estimate, moved = options.centred ? bias : 0, tail = (1 - options.confidence) / 2;
-  return {estimate, quantile(values, tail) - moved, quantile(values, 1 - tail) - moved, bias, summary.standard_deviation, summary.count};
+  const double bias = summary.mean - estimate, moved = options.centred ? bias : 0,
+               tail = (1 - options.confidence) / 2;
+  return {estimate, quantile(values, tail) - moved, quantile(values, 1 - tail) - moved,
+          bias,     summary.standard_deviation,     summary.count};
 }
 
 }  // namespace figurine::evaluate

@@ -1,9 +1,11 @@
-// How far a statistic of samples and references would move with other samples and references: percentile intervals by resampling both
-// (Efron, Bootstrap Methods: Another Look at the Jackknife, 1979). Says nothing about other training runs or other populations.
+// How far a statistic of samples and references would move with other samples and references:
+// percentile intervals by resampling both (Efron, Bootstrap Methods: Another Look at the Jackknife,
+// 1979). Says nothing about other training runs or other populations.
 //
-// Nearest neighbours make statistics depend on how many *different* items there are, and a resample has about 63 % of them: the MMD of
-// resamples lies above the estimate. `bias` says by how much, and `centred` takes it out (docs/numerics.md, "Generation", says how often
-// either interval holds the truth).
+// Nearest neighbours make statistics depend on how many *different* items there are, and a resample
+// has about 63 % of them: the MMD of resamples lies above the estimate. `bias` says by how much,
+// and `centred` takes it out (docs/numerics.md, "Generation", says how often either interval holds
+// the truth).
 #pragma once
 
 #include <cstddef>
@@ -35,9 +37,11 @@ struct BootstrapInterval {
   size_t replicates = 0;
 };
 
-// Replicate i draws as many samples and references as there are, with repetition, from (seed, i) alone. Replicates that are not finite are
-// left out, and `replicates` counts the rest; NaN where none is left. Throws InputError without items, or for options out of range.
-BootstrapInterval bootstrap_interval(size_t samples, size_t references, const std::function<double(const Items&)>& statistic,
+// Replicate i draws as many samples and references as there are, with repetition, from (seed, i)
+// alone. Replicates that are not finite are left out, and `replicates` counts the rest; NaN where
+// none is left. Throws InputError without items, or for options out of range.
+BootstrapInterval bootstrap_interval(size_t samples, size_t references,
+                                     const std::function<double(const Items&)>& statistic,
                                      const BootstrapOptions& options);
 
 }  // namespace figurine::evaluate

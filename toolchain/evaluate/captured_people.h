@@ -1,7 +1,9 @@
-// The people themselves behind a population's members: made again by the recipe and photographed by the capture's renderer in the poses and
-// by the cameras in which members are compared. What a trained avatar is to look like, free of what training lost.
+// The people themselves behind a population's members: made again by the recipe and photographed by
+// the capture's renderer in the poses and by the cameras in which members are compared. What a
+// trained avatar is to look like, free of what training lost.
 //
-// Light is the capture's, fixed in the world: a picture shows it from one heading, where an avatar has learnt the mean over all headings.
+// Light is the capture's, fixed in the world: a picture shows it from one heading, where an avatar
+// has learnt the mean over all headings.
 #pragma once
 
 #include <optional>
@@ -18,13 +20,16 @@ namespace figurine::evaluate {
 
 class CapturedPeople {
  public:
-  // Finds the population's members in the recipe. makehuman: the unpacked npm package; not needed for the mannequin. Throws InputError
-  // naming file, field and reason if the recipe is another population's.
-  CapturedPeople(const std::string& recipe, const std::string& makehuman, const Population& population);
+  // Finds the population's members in the recipe. makehuman: the unpacked npm package; not needed
+  // for the mannequin. Throws InputError naming file, field and reason if the recipe is another
+  // population's.
+  CapturedPeople(const std::string& recipe, const std::string& makehuman,
+                 const Population& population);
 
   const population::Recipe& recipe() const { return recipe_; }
-  // Of `members` of the set, whose population must be the constructor's: kComparedShots pictures each. About three seconds a person on one
-  // core. Throws InputError if a person has another shape than the member, so comes of another seed; Interrupted.
+  // Of `members` of the set, whose population must be the constructor's: kComparedShots pictures
+  // each. About three seconds a person on one core. Throws InputError if a person has another shape
+  // than the member, so comes of another seed; Interrupted.
   People draw(const MemberSet& set, std::span<const size_t> members) const;
 
  private:

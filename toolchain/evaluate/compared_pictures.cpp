@@ -13,7 +13,8 @@ namespace {
 // 16 rows of 1,024 doubles of each set: 256 KiB, what a core's second cache holds.
 constexpr Eigen::Index kRows = 16, kValues = 1024;
 
-// Lanes of their own, so that the compiler may put them side by side; the machine's widest vectors do.
+// Lanes of their own, so that the compiler may put them side by side; the machine's widest vectors
+// do.
 FIG_WIDEST_VECTORS double squared_distance(const double* a, const double* b, Eigen::Index count) {
   constexpr Eigen::Index kLanes = 32;
   double sums[kLanes] = {};
@@ -30,10 +31,12 @@ FIG_WIDEST_VECTORS double squared_distance(const double* a, const double* b, Eig
   return sum;
 }
 
-void add_tile(const RowMatrix& a, const RowMatrix& b, Eigen::Index first_a, Eigen::Index first_b, RowMatrix& sums) {
+void add_tile(const RowMatrix& a, const RowMatrix& b, Eigen::Index first_a, Eigen::Index first_b,
+              RowMatrix& sums) {
   for (Eigen::Index i = 0; i < a.rows(); ++i) {
     for (Eigen::Index j = 0; j < b.rows(); ++j) {
-      sums(first_a + i, first_b + j) += squared_distance(a.row(i).data(), b.row(j).data(), a.cols());
+      sums(first_a + i, first_b + j) +=
+          squared_distance(a.row(i).data(), b.row(j).data(), a.cols());
     }
   }
 }
@@ -47,7 +50,8 @@ void add_pairs(const PictureRows& a, const PictureRows& b, bool one_set, RowMatr
     };
     for (Eigen::Index i = 0; i < a.rows(); i += kRows) {
       const RowMatrix tile = rows(a, i);
-      for (Eigen::Index j = one_set ? i : 0; j < b.rows(); j += kRows) add_tile(tile, rows(b, j), i, j, sums);
+      for (Eigen::Index j = one_set ? i : 0; j < b.rows(); j += kRows)
+        add_tile(tile, rows(b, j), i, j, sums);
     }
   }
 }
@@ -63,7 +67,8 @@ void PooledErrors::add(const PictureRows& a, const PictureRows& b) {
 }
 
 void PooledErrors::add(const PictureRows& a) {
-  if (a.rows() != sums_.rows() || a.rows() != sums_.cols()) throw InputError("compared pictures: a set is compared with itself");
+  if (a.rows() != sums_.rows() || a.rows() != sums_.cols())
+    throw InputError("compared pictures: a set is compared with itself");
   add_pairs(a, a, true, sums_);
   for (Eigen::Index i = 0; i < sums_.rows(); ++i) {
     for (Eigen::Index j = 0; j < i; ++j) sums_(i, j) = sums_(j, i);

@@ -1,10 +1,12 @@
-// How different people look who are drawn alike: squared errors pooled over all pictures of a pair, for every pair of two sets.
+// How different people look who are drawn alike: squared errors pooled over all pictures of a pair,
+// for every pair of two sets.
 //
 // Letters: A, B items of two sets, P values of an item's pictures, V pictures of an item.
 //
-// An item is a stack of V pictures of fixed poses and views, RGB in [0,1] as stored over one background, as one row of P = V H W 3 values.
-// Unlike member_pictures' errors these have one denominator for all pairs, which nearest neighbours need: over the pixels of either
-// foreground, a slim pair would count as farther apart than a stout one with the same errors.
+// An item is a stack of V pictures of fixed poses and views, RGB in [0,1] as stored over one
+// background, as one row of P = V H W 3 values. Unlike member_pictures' errors these have one
+// denominator for all pairs, which nearest neighbours need: over the pixels of either foreground, a
+// slim pair would count as farther apart than a stout one with the same errors.
 #pragma once
 
 #include "toolchain/evaluate/weight_space.h"
@@ -13,8 +15,9 @@ namespace figurine::evaluate {
 
 using PictureRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Pooled mean squared errors of all pairs, one portion of the values after the other (all items' pictures of one view, say): memory is that
-// of a portion. In double, of differences: equal items are 0 apart, and the error of a and b is that of b and a. A B P operations.
+// Pooled mean squared errors of all pairs, one portion of the values after the other (all items'
+// pictures of one view, say): memory is that of a portion. In double, of differences: equal items
+// are 0 apart, and the error of a and b is that of b and a. A B P operations.
 class PooledErrors {
  public:
   PooledErrors(size_t a, size_t b) : sums_(RowMatrix::Zero(Eigen::Index(a), Eigen::Index(b))) {}

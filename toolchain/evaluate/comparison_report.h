@@ -13,9 +13,11 @@ nlohmann::json finite(double value);                        // null where it is 
 nlohmann::json to_json(const BootstrapInterval& interval);  // "value", "low", "high"
 
 enum class DistanceUnit { kSquaredError, kOther };
-// Of the first draw of samples, with intervals: "count", "mmd_psnr_db" (of squared errors) or "mmd", "coverage_percent", "one_nna_percent",
-// "one_nna_off_ideal". "draws", where there are several: their "count" and the means over all of them.
-nlohmann::json describe_draws(const SampleDistances& distances, DistanceUnit unit, const BootstrapOptions& bootstrap);
+// Of the first draw of samples, with intervals: "count", "mmd_psnr_db" (of squared errors) or
+// "mmd", "coverage_percent", "one_nna_percent", "one_nna_off_ideal". "draws", where there are
+// several: their "count" and the means over all of them.
+nlohmann::json describe_draws(const SampleDistances& distances, DistanceUnit unit,
+                              const BootstrapOptions& bootstrap);
 nlohmann::json describe(const Novelty& novelty);
 
 }  // namespace figurine::evaluate

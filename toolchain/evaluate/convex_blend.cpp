@@ -11,11 +11,14 @@ namespace figurine::evaluate {
 
 namespace {
 
-constexpr double kRounding = 1e-12;  // of the largest squared norm: scalar products in double leave about 1e-15
+constexpr double kRounding =
+    1e-12;  // of the largest squared norm: scalar products in double leave about 1e-15
 
 // The point of least norm in the affine hull of some points: weights of sum 1, of either sign.
-Eigen::VectorXd affine_weights(const Eigen::MatrixXd& gram, const std::vector<Eigen::Index>& points) {
-  // (G + s 1 1^T) u = 1 and w = u / sum u: adding the same to all products changes neither the minimum nor, for s > 0, its conditioning.
+Eigen::VectorXd affine_weights(const Eigen::MatrixXd& gram,
+                               const std::vector<Eigen::Index>& points) {
+  // (G + s 1 1^T) u = 1 and w = u / sum u: adding the same to all products changes neither the
+  // minimum nor, for s > 0, its conditioning.
   const auto n = static_cast<Eigen::Index>(points.size());
   Eigen::MatrixXd system(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -45,8 +48,10 @@ Eigen::VectorXd least_norm_weights(const Eigen::MatrixXd& gram) {
   Eigen::Index first = 0;
   gram.diagonal().minCoeff(&first);
   weights[first] = 1;
-  std::vector<Eigen::Index> corral{first};  // points in use: the current one is the least of their affine hull
-  // Every round ends at a smaller norm, so no corral comes twice and the rounds are finite; in rounding, the limit ends what cycles.
+  std::vector<Eigen::Index> corral{
+      first};  // points in use: the current one is the least of their affine hull
+  // Every round ends at a smaller norm, so no corral comes twice and the rounds are finite; in
+  // rounding, the limit ends what cycles.
   for (Eigen::Index round = 0; round < 10 * n; ++round) {
     const Eigen::VectorXd products = gram * weights;
     Eigen::Index next = 0;
@@ -56,7 +61,8 @@ Eigen::VectorXd least_norm_weights(const Eigen::MatrixXd& gram) {
     corral.push_back(next);
     for (;;) {
       const Eigen::VectorXd wanted = affine_weights(gram, corral);
-      double step = 1;  // from the current weights towards the wanted ones, as far as none turns negative
+      double step =
+          1;  // from the current weights towards the wanted ones, as far as none turns negative
       for (size_t i = 0; i < corral.size(); ++i) {
         const double now = weights[corral[i]], then = wanted[Eigen::Index(i)];
         if (then < 0) step = std::min(step, now / (now - then));
@@ -73,17 +79,20 @@ Eigen::VectorXd least_norm_weights(const Eigen::MatrixXd& gram) {
   return weights / weights.sum();
 }
 
-BlendSearch::BlendSearch(const RowMatrix& training) : training_(&training), mean_(training.colwise().mean()) {
+BlendSearch::BlendSearch(const RowMatrix& training)
+    : training_(&training), mean_(training.colwise().mean()) {
   FIG_CHECK(training.rows() >= 2, "at least two members");
   centred_ = training.rowwise() - mean_;
   gram_ = centred_ * centred_.transpose();
 }
 
-Blend BlendSearch::blend_of(const RowVector& z, const Eigen::MatrixXd& gram, const std::vector<size_t>& members) const {
+Blend BlendSearch::blend_of(const RowVector& z, const Eigen::MatrixXd& gram,
+                            const std::vector<size_t>& members) const {
   const auto n = static_cast<Eigen::Index>(members.size());
   Eigen::MatrixXd of_members(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    for (Eigen::Index j = 0; j < n; ++j) of_members(i, j) = gram(Eigen::Index(members[size_t(i)]), Eigen::Index(members[size_t(j)]));
+    for (Eigen::Index j = 0; j < n; ++j)
+      of_members(i, j) = gram(Eigen::Index(members[size_t(i)]), Eigen::Index(members[size_t(j)]));
   }
   const Eigen::VectorXd weights = least_norm_weights(of_members);
   Blend blend;
@@ -100,7 +109,8 @@ Blend BlendSearch::blend_of(const RowVector& z, const Eigen::MatrixXd& gram, con
 }
 
 Blends BlendSearch::closest(const RowVector& z, size_t most) const {
-  FIG_CHECK(most >= 1 && z.size() == mean_.size(), "a vector of the members' size, and at least one member");
+  FIG_CHECK(most >= 1 && z.size() == mean_.size(),
+            "a vector of the members' size, and at least one member");
   // Products of the differences z_n - z.
   const RowVector centred = z - mean_;
   const Eigen::VectorXd against = centred_ * centred.transpose();
@@ -111,7 +121,8 @@ Blends BlendSearch::closest(const RowVector& z, size_t most) const {
   const std::vector<size_t> nearest = in_order(gram.diagonal(), true);
   Blends blends{{}, blend_of(z, gram, nearest)};
   Eigen::VectorXd hull = Eigen::VectorXd::Zero(gram.rows());
-  for (size_t i = 0; i < blends.of_any.members.size(); ++i) hull[Eigen::Index(blends.of_any.members[i])] = blends.of_any.weights[i];
+  for (size_t i = 0; i < blends.of_any.members.size(); ++i)
+    hull[Eigen::Index(blends.of_any.members[i])] = blends.of_any.weights[i];
   const std::vector<size_t> heaviest = in_order(hull, false);
   for (size_t k = 1; k <= std::min(most, nearest.size()); ++k) {
     const auto first_k = [&](const std::vector<size_t>& order) {
@@ -120,7 +131,8 @@ Blends BlendSearch::closest(const RowVector& z, size_t most) const {
     Blend best = blend_of(z, gram, first_k(nearest));
     Blend other = blend_of(z, gram, first_k(heaviest));
     if (other.relative_residual < best.relative_residual) best = std::move(other);
-    if (k > 1 && blends.of_few.back().relative_residual < best.relative_residual) best = blends.of_few.back();
+    if (k > 1 && blends.of_few.back().relative_residual < best.relative_residual)
+      best = blends.of_few.back();
     blends.of_few.push_back(std::move(best));
   }
   return blends;

@@ -1,11 +1,14 @@
-// Which few training members a model vector is a mixture of: the nearest point to it in the hull of at most k members. Averages of training
-// members are what weight-space generators often emit; a person of its own is far from every such mixture.
+// Which few training members a model vector is a mixture of: the nearest point to it in the hull of
+// at most k members. Averages of training members are what weight-space generators often emit; a
+// person of its own is far from every such mixture.
 //
 // Letters: N training members, D values of a member, k members of a blend.
 //
-// The k members are searched for twice, and the better find counts: the k nearest ones, and the k heaviest in the nearest point of the hull
-// of all N. The latter is what finds an average of five where other members lie nearer than the five; since N - 1 <= D, members are as
-// good as never mixtures of each other, and a true mixture has one set of weights. No search of all sets: what is told is an upper bound.
+// The k members are searched for twice, and the better find counts: the k nearest ones, and the k
+// heaviest in the nearest point of the hull of all N. The latter is what finds an average of five
+// where other members lie nearer than the five; since N - 1 <= D, members are as good as never
+// mixtures of each other, and a true mixture has one set of weights. No search of all sets: what is
+// told is an upper bound.
 //
 // Based on: Wolfe, Finding the Nearest Point in a Polytope, 1976 (exact, finitely many steps).
 #pragma once
@@ -20,7 +23,8 @@ namespace figurine::evaluate {
 struct Blend {
   std::vector<size_t> members;   // of positive weight
   std::vector<double> weights;   // as many; sum 1
-  double relative_residual = 0;  // |z - blend| / |z - training mean|: 0 is a blend, above 1 the mean of all explains it better
+  double relative_residual = 0;  // |z - blend| / |z - training mean|: 0 is a blend, above 1 the
+                                 // mean of all explains it better
 };
 
 // Blends of at most 1, 2, ..., k members, residuals never growing; and that of any number.
@@ -38,7 +42,8 @@ class BlendSearch {
   Blends closest(const RowVector& z, size_t most) const;
 
  private:
-  Blend blend_of(const RowVector& z, const Eigen::MatrixXd& gram, const std::vector<size_t>& members) const;
+  Blend blend_of(const RowVector& z, const Eigen::MatrixXd& gram,
+                 const std::vector<size_t>& members) const;
 
   const RowMatrix* training_;
   RowVector mean_;        // [D]
@@ -46,8 +51,9 @@ class BlendSearch {
   Eigen::MatrixXd gram_;  // [N,N] of the centred members
 };
 
-// Weights [n] (none negative, sum 1) that minimise w^T gram w: the point of least norm in the hull of n points whose scalar products are
-// given. gram: [n,n] symmetric, positive semi-definite, n >= 1.
+// Weights [n] (none negative, sum 1) that minimise w^T gram w: the point of least norm in the hull
+// of n points whose scalar products are given. gram: [n,n] symmetric, positive semi-definite, n
+// >= 1.
 Eigen::VectorXd least_norm_weights(const Eigen::MatrixXd& gram);
 
 }  // namespace figurine::evaluate

@@ -1,14 +1,16 @@
-// Networks through which pictures of people are compared, as two interfaces: global features for distances between sets of pictures
-// (Frechet distance, KID), and a perceptual distance between two pictures as LPIPS defines it. docs/features.md says which there are;
-// docs/numerics.md, "Features", what they compute.
+// Networks through which pictures of people are compared, as two interfaces: global features for
+// distances between sets of pictures (Frechet distance, KID), and a perceptual distance between two
+// pictures as LPIPS defines it. docs/features.md says which there are; docs/numerics.md,
+// "Features", what they compute.
 //
-// Every picture goes through a network alone, on one thread: the numbers are the same for any number of threads and any grouping of
-// pictures, to the bit on one CPU.
+// Every picture goes through a network alone, on one thread: the numbers are the same for any
+// number of threads and any grouping of pictures, to the bit on one CPU.
 //
 // Letters: n pictures of width W and height H, F features, E values of an embedding.
 //
-// Based on: Zhang et al., The Unreasonable Effectiveness of Deep Features as a Perceptual Metric, 2018, eq. 1; Heusel et al., GANs Trained
-// by a Two Time-Scale Update Rule, 2017 (features of a set); Binkowski et al., Demystifying MMD GANs, 2018 (KID).
+// Based on: Zhang et al., The Unreasonable Effectiveness of Deep Features as a Perceptual Metric,
+// 2018, eq. 1; Heusel et al., GANs Trained by a Two Time-Scale Update Rule, 2017 (features of a
+// set); Binkowski et al., Demystifying MMD GANs, 2018 (KID).
 #pragma once
 
 #include <cstddef>
@@ -35,7 +37,9 @@ struct RgbPictures {
   uint32_t width_px = 0, height_px = 0;
   std::vector<float> values;  // [n,3,H,W]
 
-  size_t size() const { return values.empty() ? 0 : values.size() / (size_t{3} * width_px * height_px); }
+  size_t size() const {
+    return values.empty() ? 0 : values.size() / (size_t{3} * width_px * height_px);
+  }
   RgbView operator[](size_t i) const;
 };
 
@@ -45,19 +49,23 @@ RgbPictures over_grey(std::span<const Picture> pictures);
 class FeatureNetwork {
  public:
   virtual ~FeatureNetwork() = default;
-  virtual const std::string& name() const = 0;  // as every report must call what was measured through it
-  virtual nlohmann::json describe() const = 0;  // "name", "file", "hash" and what else is known of where it came from
-  virtual size_t dimension() const = 0;         // F
+  virtual const std::string& name()
+      const = 0;  // as every report must call what was measured through it
+  virtual nlohmann::json describe()
+      const = 0;  // "name", "file", "hash" and what else is known of where it came from
+  virtual size_t dimension() const = 0;  // F
   // [n,F]. Throws InputError if the network cannot take pictures of this size.
   RowMatrix features(const RgbPictures& pictures, uint32_t threads = 1) const;
 
  private:
-  // features: [F]. Called from several threads at once, each of which runs LibTorch on itself alone.
+  // features: [F]. Called from several threads at once, each of which runs LibTorch on itself
+  // alone.
   virtual void features_of(const RgbView& picture, std::span<double> features) const = 0;
 };
 
-// The distance is the squared Euclidean one between embeddings: unit-normalised activations of every layer, each times
-// sqrt(channel's weight / positions of the layer). So a picture goes through the network once, however many it is compared with.
+// The distance is the squared Euclidean one between embeddings: unit-normalised activations of
+// every layer, each times sqrt(channel's weight / positions of the layer). So a picture goes
+// through the network once, however many it is compared with.
 class PerceptualNetwork {
  public:
   virtual ~PerceptualNetwork() = default;

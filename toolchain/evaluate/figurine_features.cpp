@@ -30,7 +30,8 @@ std::vector<FeatureParameter> lay_out() {
   };
   for (size_t i = 0; i < kFeatureLayers; ++i) {
     const FeatureStage& stage = kFeatureStages[i];
-    add("stage." + std::to_string(i) + ".weight", {stage.out, stage.in, stage.kernel, stage.kernel});
+    add("stage." + std::to_string(i) + ".weight",
+        {stage.out, stage.in, stage.kernel, stage.kernel});
     add("stage." + std::to_string(i) + ".bias", {stage.out});
   }
   add("embedding.weight", {kFeatureDimension, 2 * kFeatureStages[kFeatureLayers - 1].out});
@@ -43,7 +44,9 @@ torch::Tensor part(const torch::Tensor& weights, size_t index) {
   return weights.narrow(0, parameter.begin, count_of(parameter.shape)).view(parameter.shape);
 }
 
-std::string channel_weights_name(size_t layer) { return "distance." + std::to_string(layer) + ".channel_weight"; }
+std::string channel_weights_name(size_t layer) {
+  return "distance." + std::to_string(layer) + ".channel_weight";
+}
 
 std::string floor_name(size_t layer) { return "distance." + std::to_string(layer) + ".floor"; }
 
@@ -52,11 +55,12 @@ train::NamedTensor named(const torch::Tensor& tensor, const std::vector<int64_t>
   return {shape, {values.data_ptr<float>(), values.data_ptr<float>() + values.numel()}};
 }
 
-std::vector<float> values_of(const train::TensorFile& file, const std::string& path, const std::string& name,
-                             const std::vector<int64_t>& shape) {
+std::vector<float> values_of(const train::TensorFile& file, const std::string& path,
+                             const std::string& name, const std::vector<int64_t>& shape) {
   const auto found = file.tensors.find(name);
   if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
-  if (found->second.shape != shape) throw InputError(path + ": " + name + ": is of another shape than figurine-features has");
+  if (found->second.shape != shape)
+    throw InputError(path + ": " + name + ": is of another shape than figurine-features has");
   return found->second.values;
 }
 
@@ -67,14 +71,17 @@ const std::vector<FeatureParameter>& feature_parameters() {
   return parameters;
 }
 
-int64_t feature_parameter_count() { return feature_parameters().back().begin + count_of(feature_parameters().back().shape); }
+int64_t feature_parameter_count() {
+  return feature_parameters().back().begin + count_of(feature_parameters().back().shape);
+}
 
 torch::Tensor initial_feature_weights(uint64_t seed) {
   const torch::Tensor weights = torch::zeros({feature_parameter_count()});
   for (size_t i = 0; i < feature_parameters().size(); ++i) {
     const FeatureParameter& parameter = feature_parameters()[i];
     if (parameter.shape.size() == 1) continue;
-    auto generator = at::make_generator<at::CPUGeneratorImpl>(train::random_bits(seed, kInitialWeights, i));
+    auto generator =
+        at::make_generator<at::CPUGeneratorImpl>(train::random_bits(seed, kInitialWeights, i));
     const double inputs = static_cast<double>(count_of(parameter.shape) / parameter.shape[0]);
     part(weights, i).copy_(torch::randn(parameter.shape, generator) * std::sqrt(2 / inputs));
   }
@@ -86,20 +93,23 @@ FeatureOutput run_feature_network(const torch::Tensor& weights, const torch::Ten
   torch::Tensor x = (pictures - 0.5) * 4;
   size_t next = 0;
   for (const FeatureStage& stage : kFeatureStages) {
-    x = torch::relu(model::conv2d(x, part(weights, next), part(weights, next + 1), stage.stride, stage.kernel / 2));
+    x = torch::relu(model::conv2d(x, part(weights, next), part(weights, next + 1), stage.stride,
+                                  stage.kernel / 2));
     out.activations.push_back(x);
     next += 2;
   }
   const torch::Tensor pooled = torch::cat({x.mean({2, 3}), x.amax({2, 3})}, 1);
-  const torch::Tensor features = torch::linear(pooled, part(weights, next), part(weights, next + 1));
-  out.features = torch::nn::functional::normalize(features) * std::sqrt(static_cast<double>(kFeatureDimension));
+  const torch::Tensor features =
+      torch::linear(pooled, part(weights, next), part(weights, next + 1));
+  out.features = torch::nn::functional::normalize(features) *
+                 std::sqrt(static_cast<double>(kFeatureDimension));
   return out;
 }
 
 torch::Tensor prepare_for_features(const RgbView& picture) {
   if (picture.width_px != picture.height_px) {
-    throw InputError("figurine-features: pictures must be square, not " + std::to_string(picture.width_px) + "x" +
-                     std::to_string(picture.height_px));
+    throw InputError("figurine-features: pictures must be square, not " +
+                     std::to_string(picture.width_px) + "x" + std::to_string(picture.height_px));
   }
   const torch::NoGradGuard no_gradient;
   const torch::Tensor given = to_tensor(picture);
@@ -107,8 +117,11 @@ torch::Tensor prepare_for_features(const RgbView& picture) {
   return at::_upsample_bilinear2d_aa(given, {kFeatureSide_px, kFeatureSide_px}, false);
 }
 
-FigurineFeatures::FigurineFeatures(torch::Tensor weights, std::vector<LayerWeights> distance, std::map<std::string, std::string> provenance)
-    : weights_(std::move(weights)), distance_(std::move(distance)), provenance_(std::move(provenance)) {}
+FigurineFeatures::FigurineFeatures(torch::Tensor weights, std::vector<LayerWeights> distance,
+                                   std::map<std::string, std::string> provenance)
+    : weights_(std::move(weights)),
+      distance_(std::move(distance)),
+      provenance_(std::move(provenance)) {}
 
 FigurineFeatures FigurineFeatures::load(const std::string& path) {
   const train::TensorFile file = train::read_tensor_file(path);
@@ -120,13 +133,16 @@ FigurineFeatures FigurineFeatures::load(const std::string& path) {
   for (size_t i = 0; i < feature_parameters().size(); ++i) {
     const FeatureParameter& parameter = feature_parameters()[i];
     const std::vector<float> values = values_of(file, path, parameter.name, parameter.shape);
-    std::memcpy(weights.data_ptr<float>() + parameter.begin, values.data(), values.size() * sizeof(float));
+    std::memcpy(weights.data_ptr<float>() + parameter.begin, values.data(),
+                values.size() * sizeof(float));
   }
   std::vector<LayerWeights> distance;
   for (size_t l = 0; l < kFeatureLayers; ++l) {
-    const std::vector<float> values = values_of(file, path, channel_weights_name(l), {kFeatureStages[l].out});
+    const std::vector<float> values =
+        values_of(file, path, channel_weights_name(l), {kFeatureStages[l].out});
     for (const float weight : values) {
-      if (weight < 0) throw InputError(path + ": " + channel_weights_name(l) + ": holds a negative weight");
+      if (weight < 0)
+        throw InputError(path + ": " + channel_weights_name(l) + ": holds a negative weight");
     }
     const float floor = values_of(file, path, floor_name(l), {1})[0];
     if (!(floor > 0)) throw InputError(path + ": " + floor_name(l) + ": is not above 0");
@@ -142,7 +158,8 @@ void FigurineFeatures::save(const std::string& path) const {
   train::TensorFile file{.metadata = provenance_, .tensors = {}};
   file.metadata["format"] = kFormat;
   for (size_t i = 0; i < feature_parameters().size(); ++i) {
-    file.tensors[feature_parameters()[i].name] = named(part(weights_, i), feature_parameters()[i].shape);
+    file.tensors[feature_parameters()[i].name] =
+        named(part(weights_, i), feature_parameters()[i].shape);
   }
   for (size_t l = 0; l < kFeatureLayers; ++l) {
     file.tensors[channel_weights_name(l)] = named(distance_[l].channels, {kFeatureStages[l].out});
@@ -167,13 +184,16 @@ nlohmann::json FigurineFeatures::describe() const {
 
 void FigurineFeatures::features_of(const RgbView& picture, std::span<double> features) const {
   const torch::NoGradGuard no_gradient;
-  const torch::Tensor row = run_feature_network(weights_, prepare_for_features(picture)).features.to(torch::kFloat64).contiguous();
+  const torch::Tensor row = run_feature_network(weights_, prepare_for_features(picture))
+                                .features.to(torch::kFloat64)
+                                .contiguous();
   std::memcpy(features.data(), row.data_ptr<double>(), features.size_bytes());
 }
 
 std::vector<float> FigurineFeatures::embedding_of(const RgbView& picture) const {
   const torch::NoGradGuard no_gradient;
-  return perceptual_embedding(run_feature_network(weights_, prepare_for_features(picture)).activations, distance_);
+  return perceptual_embedding(
+      run_feature_network(weights_, prepare_for_features(picture)).activations, distance_);
 }
 
 }  // namespace figurine::evaluate

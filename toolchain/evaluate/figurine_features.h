@@ -1,10 +1,13 @@
-// figurine-features: the project's own network for comparing pictures of people, because no pretrained one may be shipped
-// (docs/features.md). Five convolutions, then the mean and the greatest value of every channel, then F = 32 features of length sqrt(F). It
-// was trained to tell the training members of a population apart whatever their pose and the camera (feature_trainer.h). It is neither
-// LPIPS nor an Inception, and no report may call its numbers LPIPS or FID.
+// figurine-features: the project's own network for comparing pictures of people, because no
+// pretrained one may be shipped (docs/features.md). Five convolutions, then the mean and the
+// greatest value of every channel, then F = 32 features of length sqrt(F). It was trained to tell
+// the training members of a population apart whatever their pose and the camera
+// (feature_trainer.h). It is neither LPIPS nor an Inception, and no report may call its numbers
+// LPIPS or FID.
 //
-// Pictures come in at 128 x 128; larger ones are shrunk by a triangle filter as wide as the ratio. The network has no normalisation across
-// positions, so an activation depends on its surroundings alone.
+// Pictures come in at 128 x 128; larger ones are shrunk by a triangle filter as wide as the ratio.
+// The network has no normalisation across positions, so an activation depends on its surroundings
+// alone.
 #pragma once
 
 #include <torch/torch.h>
@@ -27,12 +30,14 @@ inline constexpr int64_t kFeatureDimension = 32;
 struct FeatureStage {
   int64_t in, out, kernel, stride;  // padding kernel / 2, then ReLU
 };
-inline constexpr FeatureStage kFeatureStages[] = {{3, 24, 5, 2}, {24, 48, 3, 2}, {48, 72, 3, 2}, {72, 96, 3, 2}, {96, 96, 3, 1}};
+inline constexpr FeatureStage kFeatureStages[] = {
+    {3, 24, 5, 2}, {24, 48, 3, 2}, {48, 72, 3, 2}, {72, 96, 3, 2}, {96, 96, 3, 1}};
 inline constexpr size_t kFeatureLayers = std::size(kFeatureStages);
 
 // Where each parameter lies in the flat tensor of all of them.
 struct FeatureParameter {
-  std::string name;  // "stage.N.weight" [out,in,k,k], "stage.N.bias", "embedding.weight" [F,2C], "embedding.bias"
+  std::string name;  // "stage.N.weight" [out,in,k,k], "stage.N.bias", "embedding.weight" [F,2C],
+                     // "embedding.bias"
   std::vector<int64_t> shape;
   int64_t begin = 0;
 };
@@ -55,7 +60,8 @@ torch::Tensor prepare_for_features(const RgbView& picture);
 class FigurineFeatures : public FeatureNetwork, public PerceptualNetwork {
  public:
   // distance: of every layer. provenance: as the file's metadata.
-  FigurineFeatures(torch::Tensor weights, std::vector<LayerWeights> distance, std::map<std::string, std::string> provenance);
+  FigurineFeatures(torch::Tensor weights, std::vector<LayerWeights> distance,
+                   std::map<std::string, std::string> provenance);
   // Throws InputError naming file, tensor and reason.
   static FigurineFeatures load(const std::string& path);
   void save(const std::string& path) const;

@@ -1,5 +1,6 @@
-// What networks say of sampled people, beside PSNR: MMD, COV, 1-NNA and novelty in a perceptual distance; Frechet distance and KID's
-// estimate of features. Everything is keyed by the network's own name, because only the originals' numbers are LPIPS, FID and KID.
+// What networks say of sampled people, beside PSNR: MMD, COV, 1-NNA and novelty in a perceptual
+// distance; Frechet distance and KID's estimate of features. Everything is keyed by the network's
+// own name, because only the originals' numbers are LPIPS, FID and KID.
 //
 // Letters: N training and H held-out members, V pictures of each.
 #pragma once
@@ -13,26 +14,32 @@
 
 namespace figurine::evaluate {
 
-// Below so many pictures a feature a Frechet distance is mostly the bias of its covariances, and left out.
+// Below so many pictures a feature a Frechet distance is mostly the bias of its covariances, and
+// left out.
 inline constexpr size_t kPicturesPerFeature = 4;
 
 // References once, then one row after the other.
 class GenerationNetworks {
  public:
-  // All is borrowed but the pictures. Throws InputError if a network cannot take the pictures, or Interrupted.
-  GenerationNetworks(const ComparingNetworks& networks, const People& training, const People& held_out, uint32_t threads,
-                     const BootstrapOptions& bootstrap);
+  // All is borrowed but the pictures. Throws InputError if a network cannot take the pictures, or
+  // Interrupted.
+  GenerationNetworks(const ComparingNetworks& networks, const People& training,
+                     const People& held_out, uint32_t threads, const BootstrapOptions& bootstrap);
 
-  // Adds to a row's "held_out" and "train" the objects "perceptual", "frechet" and "kid", and to its "novelty" the object "perceptual";
-  // nothing without networks. samples: at least max(N, H). learnt: the first so many training members, whom the novelty audit looks for.
+  // Adds to a row's "held_out" and "train" the objects "perceptual", "frechet" and "kid", and to
+  // its "novelty" the object "perceptual"; nothing without networks. samples: at least max(N, H).
+  // learnt: the first so many training members, whom the novelty audit looks for.
   void add_samples(const People& samples, Eigen::Index learnt, nlohmann::json& row) const;
-  void add_training_as_samples(nlohmann::json& row) const;  // to "held_out", in draws of H; needs N >= H
+  void add_training_as_samples(
+      nlohmann::json& row) const;  // to "held_out", in draws of H; needs N >= H
   void add_held_out_novelty(nlohmann::json& row) const;
 
  private:
   // Of as many samples as references. Distances: [n,n]; features: [n V, F].
-  nlohmann::json compare_distances(RowMatrix to_references, RowMatrix samples, RowMatrix references) const;
-  void compare_features(const FeatureNetwork& network, const RowMatrix& samples, const RowMatrix& references, nlohmann::json& part) const;
+  nlohmann::json compare_distances(RowMatrix to_references, RowMatrix samples,
+                                   RowMatrix references) const;
+  void compare_features(const FeatureNetwork& network, const RowMatrix& samples,
+                        const RowMatrix& references, nlohmann::json& part) const;
 
   const ComparingNetworks& networks_;
   uint32_t threads_;

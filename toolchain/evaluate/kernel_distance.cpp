@@ -13,8 +13,10 @@ namespace figurine::evaluate {
 namespace {
 
 void check(const RowMatrix& a, const RowMatrix& b) {
-  if (a.rows() < 2 || b.rows() < 2) throw InputError("features: at least two items in each set are needed");
-  if (a.cols() != b.cols() || a.cols() == 0) throw InputError("features: the two sets have different numbers of features, or none");
+  if (a.rows() < 2 || b.rows() < 2)
+    throw InputError("features: at least two items in each set are needed");
+  if (a.cols() != b.cols() || a.cols() == 0)
+    throw InputError("features: the two sets have different numbers of features, or none");
   if (!a.allFinite() || !b.allFinite()) throw InputError("features: a value is not finite");
 }
 
@@ -29,7 +31,9 @@ double mean_of_different(const RowMatrix& a) {
   return (of_pairs.sum() - of_pairs.trace()) / (n * (n - 1));
 }
 
-double estimate(const RowMatrix& a, const RowMatrix& b) { return mean_of_different(a) + mean_of_different(b) - 2 * kernel(a, b).mean(); }
+double estimate(const RowMatrix& a, const RowMatrix& b) {
+  return mean_of_different(a) + mean_of_different(b) - 2 * kernel(a, b).mean();
+}
 
 // Means of V x V blocks.
 RowMatrix kernel_of_people(const RowMatrix& a, const RowMatrix& b, size_t pictures) {
@@ -37,7 +41,8 @@ RowMatrix kernel_of_people(const RowMatrix& a, const RowMatrix& b, size_t pictur
   const auto v = static_cast<Eigen::Index>(pictures);
   RowMatrix people(of_pictures.rows() / v, of_pictures.cols() / v);
   for (Eigen::Index i = 0; i < people.rows(); ++i) {
-    for (Eigen::Index j = 0; j < people.cols(); ++j) people(i, j) = of_pictures.block(i * v, j * v, v, v).mean();
+    for (Eigen::Index j = 0; j < people.cols(); ++j)
+      people(i, j) = of_pictures.block(i * v, j * v, v, v).mean();
   }
   return people;
 }
@@ -57,7 +62,8 @@ double mean_of_different(const RowMatrix& kernels, const std::vector<size_t>& pe
 
 RowMatrix rows_of(const RowMatrix& set, const std::vector<size_t>& rows) {
   RowMatrix chosen(Eigen::Index(rows.size()), set.cols());
-  for (size_t i = 0; i < rows.size(); ++i) chosen.row(Eigen::Index(i)) = set.row(Eigen::Index(rows[i]));
+  for (size_t i = 0; i < rows.size(); ++i)
+    chosen.row(Eigen::Index(i)) = set.row(Eigen::Index(rows[i]));
   return chosen;
 }
 
@@ -68,17 +74,19 @@ double kernel_distance(const RowMatrix& a, const RowMatrix& b) {
   return estimate(a, b);
 }
 
-KernelDistance kernel_distance(const RowMatrix& a, const RowMatrix& b, const KernelSubsets& subsets) {
+KernelDistance kernel_distance(const RowMatrix& a, const RowMatrix& b,
+                               const KernelSubsets& subsets) {
   check(a, b);
   const auto n = static_cast<size_t>(a.rows()), m = static_cast<size_t>(b.rows());
   if (subsets.subsets == 0 || subsets.size < 2 || subsets.size > n || subsets.size > m) {
-    throw InputError("features: subsets of " + std::to_string(subsets.size) + " items of sets of " + std::to_string(n) + " and " +
-                     std::to_string(m));
+    throw InputError("features: subsets of " + std::to_string(subsets.size) + " items of sets of " +
+                     std::to_string(n) + " and " + std::to_string(m));
   }
   std::vector<double> values(subsets.subsets);
   for (size_t i = 0; i < values.size(); ++i) {
     const auto subset = [&](const RowMatrix& set, size_t which) {
-      const RandomStream stream(subsets.seed, RandomUse::kFeatureSubset, static_cast<uint32_t>(2 * i + which));
+      const RandomStream stream(subsets.seed, RandomUse::kFeatureSubset,
+                                static_cast<uint32_t>(2 * i + which));
       return rows_of(set, stream.distinct(subsets.size, size_t(set.rows())));
     };
     values[i] = estimate(subset(a, 0), subset(b, 1));
@@ -87,11 +95,14 @@ KernelDistance kernel_distance(const RowMatrix& a, const RowMatrix& b, const Ker
   return {summary.mean, summary.standard_deviation};
 }
 
-KernelComparison::KernelComparison(const RowMatrix& samples, const RowMatrix& references, size_t pictures) {
+KernelComparison::KernelComparison(const RowMatrix& samples, const RowMatrix& references,
+                                   size_t pictures) {
   check(samples, references);
   const auto v = static_cast<Eigen::Index>(pictures);
-  if (v < 1 || samples.rows() % v != 0 || references.rows() % v != 0 || samples.rows() < 2 * v || references.rows() < 2 * v) {
-    throw InputError("features: at least two people in each set are needed, of " + std::to_string(pictures) + " pictures each");
+  if (v < 1 || samples.rows() % v != 0 || references.rows() % v != 0 || samples.rows() < 2 * v ||
+      references.rows() < 2 * v) {
+    throw InputError("features: at least two people in each set are needed, of " +
+                     std::to_string(pictures) + " pictures each");
   }
   between_ = kernel_of_people(samples, references, pictures);
   samples_ = kernel_of_people(samples, samples, pictures);
@@ -104,7 +115,8 @@ double KernelComparison::distance(const Items& items) const {
     for (const size_t r : items.references) between += between_(Eigen::Index(s), Eigen::Index(r));
   }
   between /= static_cast<double>(items.samples.size() * items.references.size());
-  return mean_of_different(samples_, items.samples) + mean_of_different(references_, items.references) - 2 * between;
+  return mean_of_different(samples_, items.samples) +
+         mean_of_different(references_, items.references) - 2 * between;
 }
 
 }  // namespace figurine::evaluate

@@ -1,5 +1,6 @@
-// Pictures of a population's members that can be compared: everybody in the same poses, seen by the same cameras, drawn by the device's
-// renderer in float. Cameras are framed once, on all members, so that one scale fits everybody.
+// Pictures of a population's members that can be compared: everybody in the same poses, seen by the
+// same cameras, drawn by the device's renderer in float. Cameras are framed once, on all members,
+// so that one scale fits everybody.
 #pragma once
 
 #include <array>
@@ -29,11 +30,14 @@ struct OpenedMember {
   Avatar avatar;
 };
 
-// Poses in which all members are drawn, above the origin. Of a motion: frames spread over it. Without one: golden poses of training
-// members, the first one's and then always the one that differs most from those that were taken. Throws InputError if there are none.
-std::vector<train::OwnedPose> fixed_poses(const Population& population, const Motion* motion, size_t count);
+// Poses in which all members are drawn, above the origin. Of a motion: frames spread over it.
+// Without one: golden poses of training members, the first one's and then always the one that
+// differs most from those that were taken. Throws InputError if there are none.
+std::vector<train::OwnedPose> fixed_poses(const Population& population, const Motion* motion,
+                                          size_t count);
 
-// From where a pose is looked at. Azimuth 0 sees the person's front, positive angles move the camera to its left.
+// From where a pose is looked at. Azimuth 0 sees the person's front, positive angles move the
+// camera to its left.
 struct Shot {
   size_t pose = 0;
   float azimuth_deg = 0;
@@ -54,11 +58,16 @@ class Studio {
 
   const std::vector<Shot>& shots() const { return shots_; }
   PoseView pose(size_t shot) const { return poses_[shots_[shot].pose].view(); }
-  const Camera& camera(size_t shot) const { return cameras_[shot]; }  // of no size before it is framed
-  // Where the avatar appears in every shot but for the 0.2 % of its Gaussians that lie farthest out on each side.
+  const Camera& camera(size_t shot) const {
+    return cameras_[shot];
+  }  // of no size before it is framed
+  // Where the avatar appears in every shot but for the 0.2 % of its Gaussians that lie farthest out
+  // on each side.
   std::vector<Extent> look(const Avatar& avatar) const;
-  // The shot's camera: the largest scale at which the extent fits into the picture but for a margin of its sides.
-  void frame(size_t shot, const Extent& extent, uint32_t width_px, uint32_t height_px, float margin);
+  // The shot's camera: the largest scale at which the extent fits into the picture but for a margin
+  // of its sides.
+  void frame(size_t shot, const Extent& extent, uint32_t width_px, uint32_t height_px,
+             float margin);
   // Shots [first, end), which must have been framed.
   std::vector<Picture> draw(const Avatar& avatar, size_t first, size_t end) const;
 
@@ -72,11 +81,13 @@ class Studio {
   std::vector<Camera> cameras_;  // [shots]
 };
 
-// Over pixels that are foreground in either picture, over mid-grey: unlike foreground_error neither of the two is the truth.
+// Over pixels that are foreground in either picture, over mid-grey: unlike foreground_error neither
+// of the two is the truth.
 SquaredError union_error(const Picture& a, const Picture& b);
 SquaredError union_error(std::span<const Picture> a, std::span<const Picture> b);
 
-// The same for many pairs of the same members: pixels that are foreground in no member are left out once, the rest is compared in integers.
+// The same for many pairs of the same members: pixels that are foreground in no member are left out
+// once, the rest is compared in integers.
 class ComparedPictures {
  public:
   // members: [M] of as many pictures each.
@@ -89,7 +100,8 @@ class ComparedPictures {
   std::vector<int16_t> foreground_;  // [M,P] -1 or 0
 };
 
-// Work of many equal pieces: spread over threads, interruptible, with a progress line. The first exception of a piece is thrown again.
+// Work of many equal pieces: spread over threads, interruptible, with a progress line. The first
+// exception of a piece is thrown again.
 class Crew {
  public:
   Crew(uint32_t threads, bool quiet) : threads_(threads), quiet_(quiet) {}

@@ -9,15 +9,18 @@ namespace figurine::evaluate {
 
 namespace {
 
-constexpr size_t kFewestTraining = 3;  // two have one direction and one distance: nothing to say of a population
+constexpr size_t kFewestTraining =
+    3;  // two have one direction and one distance: nothing to say of a population
 constexpr float kPictureMargin = 0.04f, kPortraitMargin = 0.045f;
-constexpr uint32_t kSupersampling = 2;               // the splatter's 0.3 px^2 of blur are a quarter of that in a portrait
+constexpr uint32_t kSupersampling =
+    2;  // the splatter's 0.3 px^2 of blur are a quarter of that in a portrait
 constexpr float kNarrowest = 0.35f, kWidest = 0.9f;  // of a portrait, by its height
 
 std::vector<Shot> make_shots() {
   std::vector<Shot> shots;
   for (size_t pose = 0; pose < 2; ++pose) {
-    for (const float azimuth_deg : {0.0f, 120.0f, 240.0f}) shots.push_back({pose, azimuth_deg, 5, false});
+    for (const float azimuth_deg : {0.0f, 120.0f, 240.0f})
+      shots.push_back({pose, azimuth_deg, 5, false});
   }
   shots.push_back({0, 20, 5, true});
   shots.push_back({0, 200, 5, true});
@@ -34,7 +37,8 @@ std::vector<size_t> members_of(const Population& population, bool training) {
 
 RowMatrix rows_of(const RowMatrix& all, const std::vector<size_t>& rows) {
   RowMatrix chosen(static_cast<Eigen::Index>(rows.size()), all.cols());
-  for (size_t i = 0; i < rows.size(); ++i) chosen.row(static_cast<Eigen::Index>(i)) = all.row(static_cast<Eigen::Index>(rows[i]));
+  for (size_t i = 0; i < rows.size(); ++i)
+    chosen.row(static_cast<Eigen::Index>(i)) = all.row(static_cast<Eigen::Index>(rows[i]));
   return chosen;
 }
 
@@ -46,8 +50,9 @@ const Population& check(const Package& package, const Package& body) {
   if (!fits.ok()) throw InputError("population '" + population.name + "': " + fits.message());
   const size_t training = members_of(population, true).size();
   if (training < kFewestTraining) {
-    throw InputError("population '" + population.name + "': has " + std::to_string(training) + " training members, at least " +
-                     std::to_string(kFewestTraining) + " are needed");
+    throw InputError("population '" + population.name + "': has " + std::to_string(training) +
+                     " training members, at least " + std::to_string(kFewestTraining) +
+                     " are needed");
   }
   return population;
 }
@@ -65,9 +70,11 @@ Picture shrink(const Picture& picture, uint32_t by) {
       for (uint32_t c = 0; c < 4; ++c) {
         uint32_t sum = by * by / 2;
         for (uint32_t j = 0; j < by; ++j) {
-          for (uint32_t i = 0; i < by; ++i) sum += picture.rgba[(size_t(y * by + j) * picture.width_px + x * by + i) * 4 + c];
+          for (uint32_t i = 0; i < by; ++i)
+            sum += picture.rgba[(size_t(y * by + j) * picture.width_px + x * by + i) * 4 + c];
         }
-        small.rgba[(size_t(y) * small.width_px + x) * 4 + c] = static_cast<uint8_t>(sum / (by * by));
+        small.rgba[(size_t(y) * small.width_px + x) * 4 + c] =
+            static_cast<uint8_t>(sum / (by * by));
       }
     }
   }
@@ -76,7 +83,8 @@ Picture shrink(const Picture& picture, uint32_t by) {
 
 }  // namespace
 
-MemberSet::MemberSet(const Package& population_package, const Package& body_package, const MemberSetOptions& options)
+MemberSet::MemberSet(const Package& population_package, const Package& body_package,
+                     const MemberSetOptions& options)
     : package(&population_package),
       body(&body_package),
       crew(options.threads, options.quiet),
@@ -93,12 +101,14 @@ MemberSet::MemberSet(const Package& population_package, const Package& body_pack
       picture_px(std::clamp(2 * population().network.input_size, 128u, 256u)),
       pictures(population().size()) {
   frame_studio();
-  crew.run("drawing members", population().size(), [&](size_t m) { pictures[m] = draw(OpenedMember(population(), m).avatar); });
+  crew.run("drawing members", population().size(),
+           [&](size_t m) { pictures[m] = draw(OpenedMember(population(), m).avatar); });
 }
 
 void MemberSet::frame_studio() {
   std::vector<std::vector<Extent>> extents(population().size());
-  crew.run("framing", population().size(), [&](size_t m) { extents[m] = studio.look(OpenedMember(population(), m).avatar); });
+  crew.run("framing", population().size(),
+           [&](size_t m) { extents[m] = studio.look(OpenedMember(population(), m).avatar); });
   for (size_t shot = 0; shot < studio.shots().size(); ++shot) {
     Extent all;
     for (const std::vector<Extent>& own : extents) all.add(own[shot]);
@@ -114,8 +124,10 @@ void MemberSet::frame_studio() {
 
 Picture MemberSet::portrait(const Avatar& avatar, size_t shot, uint32_t height_px) const {
   const float aspect = std::clamp(portrait_extent_.aspect(), kNarrowest, kWidest);
-  // Drawn at about the scale of the pictures that trained the presets, then shrunk: the splatter's blur of 0.3 px^2 belongs to that scale.
-  const auto finer = std::max(1u, static_cast<uint32_t>(std::lround(3.2 * population().network.input_size / height_px)));
+  // Drawn at about the scale of the pictures that trained the presets, then shrunk: the splatter's
+  // blur of 0.3 px^2 belongs to that scale.
+  const auto finer = std::max(
+      1u, static_cast<uint32_t>(std::lround(3.2 * population().network.input_size / height_px)));
   const auto width_px = static_cast<uint32_t>(std::lround(aspect * static_cast<float>(height_px)));
   Studio framed = studio;
   framed.frame(shot, portrait_extent_, finer * width_px, finer * height_px, kPortraitMargin);

@@ -1,4 +1,5 @@
-// A population ready to be measured: who is in which part, everybody's standardised weights, everybody's pictures.
+// A population ready to be measured: who is in which part, everybody's standardised weights,
+// everybody's pictures.
 #pragma once
 
 #include <cstdint>
@@ -18,16 +19,21 @@ struct MemberSetOptions {
 
 // The pictures that everything is compared by come first; portraits are for people to look at.
 inline constexpr size_t kComparedShots = 6;  // two poses from three sides
-inline constexpr size_t kPortraitShots = 2;  // grounded: from the front, slightly turned, and from behind
+inline constexpr size_t kPortraitShots =
+    2;  // grounded: from the front, slightly turned, and from behind
 inline constexpr size_t kFrontPortrait = kComparedShots, kBackPortrait = kComparedShots + 1;
 
 struct MemberSet {
-  // Both are borrowed. Throws InputError if the population does not fit the body or has fewer than three training members; Interrupted.
-  MemberSet(const Package& population_package, const Package& body_package, const MemberSetOptions& options);
+  // Both are borrowed. Throws InputError if the population does not fit the body or has fewer than
+  // three training members; Interrupted.
+  MemberSet(const Package& population_package, const Package& body_package,
+            const MemberSetOptions& options);
 
   const Population& population() const { return package->population(); }
   const std::string& name(size_t member) const { return population().members[member].name; }
-  std::vector<Picture> draw(const Avatar& avatar) const { return studio.draw(avatar, 0, kComparedShots); }
+  std::vector<Picture> draw(const Avatar& avatar) const {
+    return studio.draw(avatar, 0, kComparedShots);
+  }
   // One person to look at, a cell of `height_px`; all cells of a height are of one width and scale.
   Picture portrait(const Avatar& avatar, size_t shot, uint32_t height_px) const;
 

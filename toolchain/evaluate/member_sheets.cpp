@@ -24,7 +24,8 @@ void paste(const Picture& picture, ports::ImageU8& sheet, uint32_t left, uint32_
     for (uint32_t x = 0; x < picture.width_px; ++x) {
       const uint8_t* p = &picture.rgba[(size_t(y) * picture.width_px + x) * 4];
       uint8_t* out = sheet.at(left + x, top + y);
-      for (int c = 0; c < 3; ++c) out[c] = static_cast<uint8_t>(std::min(255, p[c] + ((255 - p[3]) * kGrey + 127) / 255));
+      for (int c = 0; c < 3; ++c)
+        out[c] = static_cast<uint8_t>(std::min(255, p[c] + ((255 - p[3]) * kGrey + 127) / 255));
     }
   }
 }
@@ -34,22 +35,27 @@ struct Line {
 };
 void draw_line(ports::ImageU8& sheet, const Line& line) {
   for (uint32_t y = line.top; y < line.top + line.height; ++y) {
-    for (uint32_t x = line.left; x < line.left + line.width; ++x) std::fill_n(sheet.at(x, y), 3, kLine);
+    for (uint32_t x = line.left; x < line.left + line.width; ++x)
+      std::fill_n(sheet.at(x, y), 3, kLine);
   }
 }
 
 // Members by split and name: [parts that are not empty][members].
 std::vector<std::vector<size_t>> parts_of(const Population& population) {
   std::vector<std::vector<size_t>> parts(3);
-  for (size_t m = 0; m < population.size(); ++m) parts[size_t(population.members[m].split)].push_back(m);
+  for (size_t m = 0; m < population.size(); ++m)
+    parts[size_t(population.members[m].split)].push_back(m);
   std::erase_if(parts, [](const auto& part) { return part.empty(); });
   for (auto& part : parts) {
-    std::sort(part.begin(), part.end(), [&](size_t a, size_t b) { return population.members[a].name < population.members[b].name; });
+    std::sort(part.begin(), part.end(), [&](size_t a, size_t b) {
+      return population.members[a].name < population.members[b].name;
+    });
   }
   return parts;
 }
 
-// Cell heights. Small networks were trained on small pictures: drawn much larger, their Gaussians leave gaps.
+// Cell heights. Small networks were trained on small pictures: drawn much larger, their Gaussians
+// leave gaps.
 struct Heights {
   uint32_t wall_px, mixture_px, close_px;
 };
@@ -57,9 +63,12 @@ Heights heights_for(const Population& population) {
   return population.network.input_size >= 64 ? Heights{256, 360, 420} : Heights{144, 176, 208};
 }
 
-uint32_t rows_for(size_t members, uint32_t columns) { return uint32_t((members + columns - 1) / columns); }
+uint32_t rows_for(size_t members, uint32_t columns) {
+  return uint32_t((members + columns - 1) / columns);
+}
 
-// Where a part begins, in cells. Parts of less than a row share one with their neighbour where they fit.
+// Where a part begins, in cells. Parts of less than a row share one with their neighbour where they
+// fit.
 struct Place {
   uint32_t row = 0, column = 0;
 };
@@ -103,9 +112,11 @@ uint32_t choose_columns(const std::vector<std::vector<size_t>>& parts, float cel
 // Cells of one size side by side: [rows][columns], all rows of one length.
 ports::ImageU8 tile(const std::vector<std::vector<Picture>>& rows) {
   const Picture& cell = rows[0][0];
-  ports::ImageU8 sheet = grey_image(cell.width_px * uint32_t(rows[0].size()), cell.height_px * uint32_t(rows.size()));
+  ports::ImageU8 sheet =
+      grey_image(cell.width_px * uint32_t(rows[0].size()), cell.height_px * uint32_t(rows.size()));
   for (size_t r = 0; r < rows.size(); ++r) {
-    for (size_t c = 0; c < rows[r].size(); ++c) paste(rows[r][c], sheet, uint32_t(c) * cell.width_px, uint32_t(r) * cell.height_px);
+    for (size_t c = 0; c < rows[r].size(); ++c)
+      paste(rows[r][c], sheet, uint32_t(c) * cell.width_px, uint32_t(r) * cell.height_px);
   }
   return sheet;
 }
@@ -116,20 +127,24 @@ ports::ImageU8 draw_wall(const MemberSet& set) {
   const Population& population = set.population();
   const uint32_t height = heights_for(population).wall_px;
   std::vector<Picture> portraits(population.size());
-  set.crew.run("wall", population.size(),
-               [&](size_t m) { portraits[m] = set.portrait(OpenedMember(population, m).avatar, kFrontPortrait, height); });
+  set.crew.run("wall", population.size(), [&](size_t m) {
+    portraits[m] = set.portrait(OpenedMember(population, m).avatar, kFrontPortrait, height);
+  });
   const uint32_t width = portraits[0].width_px;
   const std::vector<std::vector<size_t>> parts = parts_of(population);
-  const uint32_t columns = std::min(choose_columns(parts, float(width) / float(height)), kMaxWall_px / width);
+  const uint32_t columns =
+      std::min(choose_columns(parts, float(width) / float(height)), kMaxWall_px / width);
   const Layout layout = lay_out(parts, columns);
   uint32_t separators = 0;
   for (size_t i = 1; i < parts.size(); ++i) separators += layout.places[i].column == 0;
-  ports::ImageU8 wall = grey_image(columns * width, layout.rows * height + separators * kSeparator_px);
+  ports::ImageU8 wall =
+      grey_image(columns * width, layout.rows * height + separators * kSeparator_px);
   uint32_t above = 0;  // separators so far
   for (size_t i = 0; i < parts.size(); ++i) {
     const Place& place = layout.places[i];
     if (i > 0 && place.column == 0)
-      draw_line(wall, {0, place.row * height + kSeparator_px * above++ + kSeparator_px / 2, wall.width_px, 1});
+      draw_line(wall, {0, place.row * height + kSeparator_px * above++ + kSeparator_px / 2,
+                       wall.width_px, 1});
     const uint32_t top = place.row * height + kSeparator_px * above;
     for (uint32_t k = 0; k < parts[i].size(); ++k) {
       const uint32_t cell = place.column + k;
@@ -148,32 +163,38 @@ ports::ImageU8 draw_mixtures(const MemberSet& set, const std::vector<MixedPair>&
     const MixedPair& pair = pairs[i / kSteps];
     const OpenedMember a(set.population(), pair.a), b(set.population(), pair.b);
     std::vector<float> storage;
-    rows[i / kSteps][i % kSteps] = set.portrait(mix(a.avatar, b.avatar, kMixSteps[i % kSteps], storage), kFrontPortrait, height);
+    rows[i / kSteps][i % kSteps] = set.portrait(
+        mix(a.avatar, b.avatar, kMixSteps[i % kSteps], storage), kFrontPortrait, height);
   });
   return tile(rows);
 }
 
 ports::ImageU8 draw_close(const MemberSet& set, const std::vector<size_t>& members) {
   const uint32_t pairs_a_row = uint32_t(std::min<size_t>(5, members.size()));
-  std::vector<std::vector<Picture>> rows(rows_for(members.size(), pairs_a_row), std::vector<Picture>(2 * pairs_a_row));
+  std::vector<std::vector<Picture>> rows(rows_for(members.size(), pairs_a_row),
+                                         std::vector<Picture>(2 * pairs_a_row));
   set.crew.run("worst", members.size(), [&](size_t i) {
     const OpenedMember member(set.population(), members[i]);
     for (size_t side = 0; side < 2; ++side) {
       rows[i / pairs_a_row][2 * (i % pairs_a_row) + side] =
-          set.portrait(member.avatar, side == 0 ? kFrontPortrait : kBackPortrait, heights_for(set.population()).close_px);
+          set.portrait(member.avatar, side == 0 ? kFrontPortrait : kBackPortrait,
+                       heights_for(set.population()).close_px);
     }
   });
   return tile(rows);
 }
 
-ports::ImageU8 draw_people(const MemberSet& set, const std::vector<RowMatrix>& sets, size_t people) {
+ports::ImageU8 draw_people(const MemberSet& set, const std::vector<RowMatrix>& sets,
+                           size_t people) {
   const OpenedMember like(set.population(), set.training.front());
   std::vector<std::vector<Picture>> rows(sets.size(), std::vector<Picture>(people));
   set.crew.run("sheet", sets.size() * people, [&](size_t i) {
-    const RowVector weights = set.standardisation.restore(sets[i / people].row(static_cast<Eigen::Index>(i % people)));
+    const RowVector weights =
+        set.standardisation.restore(sets[i / people].row(static_cast<Eigen::Index>(i % people)));
     std::vector<float> storage(static_cast<size_t>(weights.size()));
-    rows[i / people][i % people] = set.portrait(with_weights(like.avatar, {weights.data(), storage.size()}, storage), kFrontPortrait,
-                                                heights_for(set.population()).wall_px);
+    rows[i / people][i % people] =
+        set.portrait(with_weights(like.avatar, {weights.data(), storage.size()}, storage),
+                     kFrontPortrait, heights_for(set.population()).wall_px);
   });
   return tile(rows);
 }

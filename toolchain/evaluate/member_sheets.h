@@ -1,5 +1,6 @@
-// A population at a glance: everybody on one wall, mixtures in strips, the worst large. Mid-grey throughout, one scale and one ground for
-// all, so that heights compare; who is who follows from the order.
+// A population at a glance: everybody on one wall, mixtures in strips, the worst large. Mid-grey
+// throughout, one scale and one ground for all, so that heights compare; who is who follows from
+// the order.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +19,8 @@ ports::ImageU8 draw_mixtures(const MemberSet& set, const std::vector<MixedPair>&
 // The given members in their order, each from the front and from behind.
 ports::ImageU8 draw_close(const MemberSet& set, const std::vector<size_t>& members);
 
-// A row for each set of standardised weights [S,W]: its first `people`, from the front; all else is the first training member's.
+// A row for each set of standardised weights [S,W]: its first `people`, from the front; all else is
+// the first training member's.
 ports::ImageU8 draw_people(const MemberSet& set, const std::vector<RowMatrix>& sets, size_t people);
 
 // Of the best quality (at most 92) that stays below max_bytes, down to 60.

@@ -10,7 +10,9 @@ namespace figurine::evaluate {
 
 namespace {
 
-nlohmann::json finite(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+nlohmann::json finite(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
 
 nlohmann::json describe(const PrincipalBasis& basis, size_t entries) {
   const Eigen::VectorXd& variance = basis.variance();
@@ -20,12 +22,15 @@ nlohmann::json describe(const PrincipalBasis& basis, size_t entries) {
           {"shared", basis.size() - entries},
           {"directions", basis.rank()},
           {"directions_for",
-           {{"50", directions_for(variance, 0.5)}, {"90", directions_for(variance, 0.9)}, {"99", directions_for(variance, 0.99)}}},
+           {{"50", directions_for(variance, 0.5)},
+            {"90", directions_for(variance, 0.9)},
+            {"99", directions_for(variance, 0.99)}}},
           {"participation_ratio", participation_ratio(variance)},
           {"variance_share", shares}};
 }
 
-// What one way of replacing held-out members loses: in weights, and in pictures against the member's own.
+// What one way of replacing held-out members loses: in weights, and in pictures against the
+// member's own.
 struct Replacement {
   explicit Replacement(size_t held_out) : lost(held_out, 0), error(held_out) {}
   std::vector<double> lost;         // [H] share of the squared distance to the training mean
@@ -38,7 +43,8 @@ SquaredError error_to(const std::vector<Picture>& own, const std::vector<Picture
   return error;
 }
 
-nlohmann::json describe(const MemberSet& set, const Replacement& replacement, const std::vector<double>& energy) {
+nlohmann::json describe(const MemberSet& set, const Replacement& replacement,
+                        const std::vector<double>& energy) {
   SquaredError pooled;
   double lost = 0, all = 0, worst_db = std::numeric_limits<double>::infinity(), most_lost = 0;
   std::vector<double> each_db;
@@ -66,7 +72,8 @@ class Projector {
     RowVector projected = RowVector::Zero(z_.size());
     for (size_t t = 0; t + 1 < bases_->size(); ++t) {
       const PrincipalBasis& basis = (*bases_)[t];
-      projected.segment(Eigen::Index(basis.begin()), Eigen::Index(basis.size())) = basis.combine(coordinates_[t], rank);
+      projected.segment(Eigen::Index(basis.begin()), Eigen::Index(basis.size())) =
+          basis.combine(coordinates_[t], rank);
     }
     return projected;
   }
@@ -93,8 +100,8 @@ struct Replacements {
   Replacement mean, nearest_weights, nearest_picture;
 };
 
-void replace_member(const MemberSet& set, const std::vector<PrincipalBasis>& bases, const std::vector<uint32_t>& ranks, size_t h,
-                    Replacements& out) {
+void replace_member(const MemberSet& set, const std::vector<PrincipalBasis>& bases,
+                    const std::vector<uint32_t>& ranks, size_t h, Replacements& out) {
   const OpenedMember opened(set.population(), set.held_out[h]);
   const std::vector<Picture>& own = set.pictures[set.held_out[h]];
   const RowVector z = set.held_out_z.row(Eigen::Index(h));
@@ -103,7 +110,9 @@ void replace_member(const MemberSet& set, const std::vector<PrincipalBasis>& bas
   const auto try_weights = [&](const RowVector& instead, Replacement& replacement) {
     const RowVector weights = set.standardisation.restore(instead);
     replacement.lost[h] = (z - instead).squaredNorm() / energy;
-    replacement.error[h] = error_to(own, set.draw(with_weights(opened.avatar, {weights.data(), size_t(weights.size())}, storage)));
+    replacement.error[h] = error_to(
+        own,
+        set.draw(with_weights(opened.avatar, {weights.data(), size_t(weights.size())}, storage)));
   };
   const Projector projector(bases, z);
   for (size_t i = 0; i < ranks.size(); ++i) {
@@ -119,8 +128,10 @@ void replace_member(const MemberSet& set, const std::vector<PrincipalBasis>& bas
   (set.training_z.rowwise() - z).rowwise().squaredNorm().minCoeff(&nearest);
   try_member(size_t(nearest), out.nearest_weights);
   std::vector<double> errors;
-  for (const size_t member : set.training) errors.push_back(union_error(own, set.pictures[member]).mse());
-  try_member(size_t(std::min_element(errors.begin(), errors.end()) - errors.begin()), out.nearest_picture);
+  for (const size_t member : set.training)
+    errors.push_back(union_error(own, set.pictures[member]).mse());
+  try_member(size_t(std::min_element(errors.begin(), errors.end()) - errors.begin()),
+             out.nearest_picture);
 }
 
 double high_pass_energy(const std::vector<Picture>& pictures) {
@@ -136,7 +147,8 @@ double foreground_pixels(const std::vector<Picture>& pictures) {
 }
 
 // The training members nearest to given standardised weights and pictures.
-nlohmann::json nearest_to(const MemberSet& set, const RowVector& z, const std::vector<Picture>& pictures) {
+nlohmann::json nearest_to(const MemberSet& set, const RowVector& z,
+                          const std::vector<Picture>& pictures) {
   Eigen::Index row = 0;
   const double squares = (set.training_z.rowwise() - z).rowwise().squaredNorm().minCoeff(&row);
   double best_db = -std::numeric_limits<double>::infinity();
@@ -179,24 +191,29 @@ std::vector<PrincipalBasis> make_bases(const MemberSet& set) {
 nlohmann::json describe_spectrum(const MemberSet& set, const std::vector<PrincipalBasis>& bases) {
   nlohmann::json tokens = nlohmann::json::array();
   for (size_t t = 0; t + 1 < bases.size(); ++t) {
-    nlohmann::json token{{"name", set.standardisation.tokens()[t].name}, {"scale", set.standardisation.scale(t)}};
+    nlohmann::json token{{"name", set.standardisation.tokens()[t].name},
+                         {"scale", set.standardisation.scale(t)}};
     token.update(describe(bases[t], set.standardisation.varying(t)));
     tokens.push_back(std::move(token));
   }
   return {{"whole", describe(bases.back(), set.standardisation.varying())}, {"tokens", tokens}};
 }
 
-nlohmann::json measure_span(const MemberSet& set, const std::vector<PrincipalBasis>& bases, std::vector<uint32_t> ranks) {
+nlohmann::json measure_span(const MemberSet& set, const std::vector<PrincipalBasis>& bases,
+                            std::vector<uint32_t> ranks) {
   const size_t held_out = set.held_out.size();
   if (held_out == 0) return nullptr;
   ranks = sound_ranks(std::move(ranks), set.training.size());
   const Replacement none(held_out);
   Replacements tried{{ranks.size(), none}, {ranks.size(), none}, none, none, none};
-  set.crew.run("projecting held-out members", held_out, [&](size_t h) { replace_member(set, bases, ranks, h, tried); });
+  set.crew.run("projecting held-out members", held_out,
+               [&](size_t h) { replace_member(set, bases, ranks, h, tried); });
   std::vector<double> energy;
-  for (size_t h = 0; h < held_out; ++h) energy.push_back(set.held_out_z.row(Eigen::Index(h)).squaredNorm());
+  for (size_t h = 0; h < held_out; ++h)
+    energy.push_back(set.held_out_z.row(Eigen::Index(h)).squaredNorm());
   nlohmann::json span{{"ranks", ranks}, {"held_out", held_out}};
-  for (const auto& [name, list] : {std::pair{"per_layer", &tried.per_layer}, std::pair{"whole", &tried.whole}}) {
+  for (const auto& [name, list] :
+       {std::pair{"per_layer", &tried.per_layer}, std::pair{"whole", &tried.whole}}) {
     for (size_t i = 0; i < ranks.size(); ++i) {
       nlohmann::json row{{"rank", ranks[i]}};
       row.update(describe(set, (*list)[i], energy));
@@ -210,7 +227,9 @@ nlohmann::json measure_span(const MemberSet& set, const std::vector<PrincipalBas
 }
 
 Avatar mix(const Avatar& a, const Avatar& b, double share, std::vector<float>& storage) {
-  const auto between = [&](float x, float y) { return static_cast<float>((1 - share) * x + share * y); };
+  const auto between = [&](float x, float y) {
+    return static_cast<float>((1 - share) * x + share * y);
+  };
   size_t size = a.shape.size();
   for (const Layer& layer : a.network.layers) size += layer.weights.size() + layer.bias.size();
   std::vector<double> first(size), second(size);
@@ -233,17 +252,21 @@ Avatar mix(const Avatar& a, const Avatar& b, double share, std::vector<float>& s
 nlohmann::json measure_interpolation(const MemberSet& set, const std::vector<MixedPair>& pairs) {
   constexpr size_t kSteps = std::size(kMixSteps);
   std::vector<Mixture> mixtures(pairs.size() * kSteps);
-  set.crew.run("mixing members", mixtures.size(),
-               [&](size_t i) { mixtures[i] = measure_mixture(set, pairs[i / kSteps], kMixSteps[i % kSteps]); });
+  set.crew.run("mixing members", mixtures.size(), [&](size_t i) {
+    mixtures[i] = measure_mixture(set, pairs[i / kSteps], kMixSteps[i % kSteps]);
+  });
   nlohmann::json report{{"steps", kMixSteps}, {"pairs", nlohmann::json::array()}};
   for (size_t p = 0; p < pairs.size(); ++p) {
     const Mixture *own = &mixtures[p * kSteps], &first = own[0], &last = own[kSteps - 1];
-    nlohmann::json row{{"a", set.name(pairs[p].a)}, {"b", set.name(pairs[p].b)}, {"why", pairs[p].why}};
+    nlohmann::json row{
+        {"a", set.name(pairs[p].a)}, {"b", set.name(pairs[p].b)}, {"why", pairs[p].why}};
     for (size_t i = 0; i < kSteps; ++i) {
-      row["steps"].push_back({{"share", kMixSteps[i]},
-                              {"highpass_ratio", finite(2 * own[i].energy / (first.energy + last.energy))},
-                              {"foreground_ratio", finite(2 * own[i].foreground / (first.foreground + last.foreground))},
-                              {"nearest", own[i].nearest}});
+      row["steps"].push_back(
+          {{"share", kMixSteps[i]},
+           {"highpass_ratio", finite(2 * own[i].energy / (first.energy + last.energy))},
+           {"foreground_ratio",
+            finite(2 * own[i].foreground / (first.foreground + last.foreground))},
+           {"nearest", own[i].nearest}});
     }
     row["middle_highpass_ratio"] = row["steps"][kSteps / 2]["highpass_ratio"];
     report["pairs"].push_back(std::move(row));

@@ -1,6 +1,6 @@
-// What a population is like, from its package alone: quality, distances between members, the spectrum of their weights, how well the
-// training members span the held-out ones, and what lies between two of them. docs/json.md describes the report, docs/numerics.md the
-// quantities.
+// What a population is like, from its package alone: quality, distances between members, the
+// spectrum of their weights, how well the training members span the held-out ones, and what lies
+// between two of them. docs/json.md describes the report, docs/numerics.md the quantities.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,9 @@
 
 namespace figurine::evaluate {
 
-// "all", "train", "validation" and "test" (null where a part is empty), each name's {"mean", "worst", "best", "standard_deviation",
-// "count"}; and "worst_members" by PSNR on held-out poses. Greater is better for every quality that packages carry.
+// "all", "train", "validation" and "test" (null where a part is empty), each name's {"mean",
+// "worst", "best", "standard_deviation", "count"}; and "worst_members" by PSNR on held-out poses.
+// Greater is better for every quality that packages carry.
 nlohmann::json describe_quality(const Population& population, size_t worst);
 // Members by PSNR on held-out poses, the worst first; those without come not at all.
 std::vector<size_t> worst_members(const Population& population, size_t count);
@@ -29,15 +30,16 @@ struct MemberDistances {
 };
 nlohmann::json describe_distances(const MemberSet& set, const MemberDistances& distances);
 
-// Training pairs worth mixing: farthest apart in weights, farthest in pictures, and one of middling distance; no pair twice, no member
-// twice as long as there are enough.
+// Training pairs worth mixing: farthest apart in weights, farthest in pictures, and one of middling
+// distance; no pair twice, no member twice as long as there are enough.
 std::vector<MixedPair> choose_pairs(const MemberDistances& distances);
 
 struct MembersOptions {
   std::vector<uint32_t> ranks{1, 2, 4, 8, 16, 32, 64, 128, 256, 512};
 };
-// The whole report but for where it came from. "span_db" repeats span.per_layer by rank: {"8": 21.5, ...}; null without held-out members.
-nlohmann::json evaluate_members(const MemberSet& set, const MemberDistances& distances, const std::vector<MixedPair>& pairs,
-                                const MembersOptions& options);
+// The whole report but for where it came from. "span_db" repeats span.per_layer by rank:
+// {"8": 21.5, ...}; null without held-out members.
+nlohmann::json evaluate_members(const MemberSet& set, const MemberDistances& distances,
+                                const std::vector<MixedPair>& pairs, const MembersOptions& options);
 
 }  // namespace figurine::evaluate

@@ -12,17 +12,24 @@ namespace {
 
 constexpr uint8_t kForegroundAlpha = 127;  // 127/255 < 0.5 < 128/255
 
-bool is_foreground(const Picture& truth, size_t pixel) { return truth.rgba[4 * pixel + 3] > kForegroundAlpha; }
-
-void check_sizes(const Picture& a, const Picture& b) {
-  FIG_CHECK(a.width_px == b.width_px && a.height_px == b.height_px && a.rgba.size() == b.rgba.size(), "pictures of one size");
+bool is_foreground(const Picture& truth, size_t pixel) {
+  return truth.rgba[4 * pixel + 3] > kForegroundAlpha;
 }
 
-Box whole(const Picture& picture) { return {0, 0, static_cast<int>(picture.width_px), static_cast<int>(picture.height_px)}; }
+void check_sizes(const Picture& a, const Picture& b) {
+  FIG_CHECK(
+      a.width_px == b.width_px && a.height_px == b.height_px && a.rgba.size() == b.rgba.size(),
+      "pictures of one size");
+}
+
+Box whole(const Picture& picture) {
+  return {0, 0, static_cast<int>(picture.width_px), static_cast<int>(picture.height_px)};
+}
 
 Box clip(const Box& box, const Picture& picture) {
   const Box all = whole(picture);
-  return {std::max(box.x0, 0), std::max(box.y0, 0), std::min(box.x1, all.x1), std::min(box.y1, all.y1)};
+  return {std::max(box.x0, 0), std::max(box.y0, 0), std::min(box.x1, all.x1),
+          std::min(box.y1, all.y1)};
 }
 
 float over_grey(const Picture& picture, size_t pixel, int channel) {
@@ -47,7 +54,8 @@ Box bounding_box(const Picture& picture) {
   for (int y = 0; y < static_cast<int>(picture.height_px); ++y) {
     for (int x = 0; x < static_cast<int>(picture.width_px); ++x) {
       if (picture.rgba[(size_t(y) * picture.width_px + x) * 4 + 3] == 0) continue;
-      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
+      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1),
+             std::max(box.y1, y + 1)};
     }
   }
   return box.empty() ? Box{} : box;
@@ -63,13 +71,17 @@ Outline compare_outlines(const Picture& prediction, const Picture& truth) {
   check_sizes(prediction, truth);
   Outline outline;
   for (size_t pixel = 0; pixel < truth.rgba.size() / 4; ++pixel) {
-    const bool in_truth = is_foreground(truth, pixel), in_prediction = is_foreground(prediction, pixel);
-    outline.add({.both = in_truth && in_prediction, .truth = in_truth, .prediction = in_prediction});
+    const bool in_truth = is_foreground(truth, pixel),
+               in_prediction = is_foreground(prediction, pixel);
+    outline.add(
+        {.both = in_truth && in_prediction, .truth = in_truth, .prediction = in_prediction});
   }
   return outline;
 }
 
-SquaredError foreground_error(const Picture& prediction, const Picture& truth) { return foreground_error(prediction, truth, whole(truth)); }
+SquaredError foreground_error(const Picture& prediction, const Picture& truth) {
+  return foreground_error(prediction, truth, whole(truth));
+}
 
 SquaredError foreground_error(const Picture& prediction, const Picture& truth, const Box& inside) {
   check_sizes(prediction, truth);
@@ -80,7 +92,8 @@ SquaredError foreground_error(const Picture& prediction, const Picture& truth, c
       const size_t pixel = size_t(y) * truth.width_px + x;
       if (!is_foreground(truth, pixel)) continue;
       for (int c = 0; c < 3; ++c) {
-        const double difference = double(over_grey(prediction, pixel, c)) - over_grey(truth, pixel, c);
+        const double difference =
+            double(over_grey(prediction, pixel, c)) - over_grey(truth, pixel, c);
         error.sum += difference * difference;
       }
       error.count += 3;
@@ -97,7 +110,8 @@ SquaredError crop_error(const Picture& prediction, const Picture& truth) {
     for (int x = box.x0; x < box.x1; ++x) {
       const size_t at = (size_t(y) * truth.width_px + x) * 4;
       for (int c = 0; c < 3; ++c) {
-        const double difference = (double(prediction.rgba[at + c]) - double(truth.rgba[at + c])) / 255.0;
+        const double difference =
+            (double(prediction.rgba[at + c]) - double(truth.rgba[at + c])) / 255.0;
         error.sum += difference * difference;
       }
       error.count += 3;
@@ -106,7 +120,8 @@ SquaredError crop_error(const Picture& prediction, const Picture& truth) {
   return error;
 }
 
-SquaredError difference_error(const Picture& prediction0, const Picture& prediction1, const Picture& truth0, const Picture& truth1) {
+SquaredError difference_error(const Picture& prediction0, const Picture& prediction1,
+                              const Picture& truth0, const Picture& truth1) {
   check_sizes(prediction0, truth0);
   check_sizes(prediction1, truth1);
   check_sizes(truth0, truth1);
@@ -114,7 +129,8 @@ SquaredError difference_error(const Picture& prediction0, const Picture& predict
   for (size_t pixel = 0; pixel < truth0.rgba.size() / 4; ++pixel) {
     if (!is_foreground(truth0, pixel) || !is_foreground(truth1, pixel)) continue;
     for (int c = 0; c < 3; ++c) {
-      const double predicted = double(over_grey(prediction1, pixel, c)) - over_grey(prediction0, pixel, c);
+      const double predicted =
+          double(over_grey(prediction1, pixel, c)) - over_grey(prediction0, pixel, c);
       const double actual = double(over_grey(truth1, pixel, c)) - over_grey(truth0, pixel, c);
       error.sum += (predicted - actual) * (predicted - actual);
     }
@@ -123,20 +139,24 @@ SquaredError difference_error(const Picture& prediction0, const Picture& predict
   return error;
 }
 
-HighPass high_pass(const Picture& prediction, const Picture& truth) { return high_pass(prediction, truth, whole(truth)); }
+HighPass high_pass(const Picture& prediction, const Picture& truth) {
+  return high_pass(prediction, truth, whole(truth));
+}
 
 HighPass high_pass(const Picture& prediction, const Picture& truth, const Box& inside) {
   check_sizes(prediction, truth);
   Box box = clip(inside, truth);
   const int width = static_cast<int>(truth.width_px), height = static_cast<int>(truth.height_px);
-  box = {std::max(box.x0, 1), std::max(box.y0, 1), std::min(box.x1, width - 1), std::min(box.y1, height - 1)};
+  box = {std::max(box.x0, 1), std::max(box.y0, 1), std::min(box.x1, width - 1),
+         std::min(box.y1, height - 1)};
   constexpr int kBinomial[3] = {1, 2, 1};
   HighPass energy;
   for (int y = box.y0; y < box.y1; ++y) {
     for (int x = box.x0; x < box.x1; ++x) {
       bool inner = true;
       for (int j = -1; j <= 1 && inner; ++j) {
-        for (int i = -1; i <= 1 && inner; ++i) inner = is_foreground(truth, size_t(y + j) * width + (x + i));
+        for (int i = -1; i <= 1 && inner; ++i)
+          inner = is_foreground(truth, size_t(y + j) * width + (x + i));
       }
       if (!inner) continue;
       for (int c = 0; c < 3; ++c) {
@@ -150,7 +170,8 @@ HighPass high_pass(const Picture& prediction, const Picture& truth, const Box& i
           }
         }
         const size_t centre = size_t(y) * width + x;
-        const double high[2] = {over_grey(prediction, centre, c) - blur[0], over_grey(truth, centre, c) - blur[1]};
+        const double high[2] = {over_grey(prediction, centre, c) - blur[0],
+                                over_grey(truth, centre, c) - blur[1]};
         energy.prediction += high[0] * high[0];
         energy.truth += high[1] * high[1];
       }
@@ -166,7 +187,8 @@ void FlatColour::add(const Picture& truth) {
     alpha2_ += alpha * alpha;
     ++pixels_;
     for (int c = 0; c < 3; ++c) {
-      const double residual = truth.rgba[4 * pixel + c] / 255.0;  // premultiplied: over grey minus (1 - a) grey
+      const double residual =
+          truth.rgba[4 * pixel + c] / 255.0;  // premultiplied: over grey minus (1 - a) grey
       alpha_residual_[c] += alpha * residual;
       residual2_[c] += residual * residual;
     }
@@ -185,7 +207,9 @@ SquaredError FlatColour::error() const {
   SquaredError error{0, 3 * pixels_};
   const std::array<double, 3> best = colour();
   // sum (r - a c)^2 = sum r^2 - 2 c sum a r + c^2 sum a^2
-  for (int c = 0; c < 3; ++c) error.sum += std::max(0.0, residual2_[c] - 2 * best[c] * alpha_residual_[c] + best[c] * best[c] * alpha2_);
+  for (int c = 0; c < 3; ++c)
+    error.sum += std::max(
+        0.0, residual2_[c] - 2 * best[c] * alpha_residual_[c] + best[c] * best[c] * alpha2_);
   return error;
 }
 

@@ -1,18 +1,20 @@
-// How close a picture of a person is to the truth. Definitions once, for every report of the project (docs/numerics.md, "Picture quality").
+// How close a picture of a person is to the truth. Definitions once, for every report of the
+// project (docs/numerics.md, "Picture quality").
 //
-// All on stored sRGB values in [0,1], both pictures over the same background, errors pooled over pixels, channels and images before the
-// logarithm.
-//   foreground  pixels whose true alpha exceeds 0.5, over mid-grey. This is "PSNR" wherever a report says no more.
-//   crop        all pixels of the bounding box of true alpha > 0, over black: flattered by the black around the person, never a target.
-//   head        foreground pixels inside the projected head box.
-//   high-pass   sum of squares of (picture - 3x3 binomial blur) over foreground pixels whose eight neighbours are foreground too:
-//   prediction over truth.
+// All on stored sRGB values in [0,1], both pictures over the same background, errors pooled over
+// pixels, channels and images before the logarithm.
+//   foreground  pixels whose true alpha exceeds 0.5, over mid-grey. This is "PSNR" wherever a
+//   report says no more. crop        all pixels of the bounding box of true alpha > 0, over black:
+//   flattered by the black around the person, never a target. head        foreground pixels inside
+//   the projected head box. high-pass   sum of squares of (picture - 3x3 binomial blur) over
+//   foreground pixels whose eight neighbours are foreground too: prediction over truth.
 //               1 is as sharp as the truth; a blurred face passes PSNR and fails this.
-//   difference  PSNR of (frame t+1 - frame t), prediction against truth, over pixels that are foreground in both true frames: shimmer.
-//   outline     true alpha above 0.5 against predicted: intersection over union, and the share of the truth that the prediction leaves
-//   uncovered: what hair or a skirt is worth that was not learnt.
-//   flat        PSNR of a person of one colour (the best one for the very pixels it is judged on) with a perfect mask: what dark clothes
-//   give for free.
+//   difference  PSNR of (frame t+1 - frame t), prediction against truth, over pixels that are
+//   foreground in both true frames: shimmer. outline     true alpha above 0.5 against predicted:
+//   intersection over union, and the share of the truth that the prediction leaves uncovered: what
+//   hair or a skirt is worth that was not learnt. flat        PSNR of a person of one colour (the
+//   best one for the very pixels it is judged on) with a perfect mask: what dark clothes give for
+//   free.
 #pragma once
 
 #include <array>
@@ -36,7 +38,8 @@ struct Box {
 
 inline constexpr float kMidGrey = 0.5f;
 
-// Premultiplied float RGBA, as a splatter leaves it, clamped and rounded to the nearest 8-bit value. rgba: [H,W,4].
+// Premultiplied float RGBA, as a splatter leaves it, clamped and rounded to the nearest 8-bit
+// value. rgba: [H,W,4].
 Picture quantise_picture(uint32_t width_px, uint32_t height_px, std::span<const float> rgba);
 
 // Where alpha > 0; empty if nowhere.
@@ -58,17 +61,22 @@ struct SquaredError {
 SquaredError foreground_error(const Picture& prediction, const Picture& truth);
 SquaredError foreground_error(const Picture& prediction, const Picture& truth, const Box& inside);
 SquaredError crop_error(const Picture& prediction, const Picture& truth);
-SquaredError difference_error(const Picture& prediction0, const Picture& prediction1, const Picture& truth0, const Picture& truth1);
+SquaredError difference_error(const Picture& prediction0, const Picture& prediction1,
+                              const Picture& truth0, const Picture& truth1);
 
 // Pixels inside either outline, alpha above 0.5.
 struct Outline {
   uint64_t both = 0, truth = 0, prediction = 0;
-  void add(const Outline& other) { both += other.both, truth += other.truth, prediction += other.prediction; }
+  void add(const Outline& other) {
+    both += other.both, truth += other.truth, prediction += other.prediction;
+  }
   double iou() const { return ratio(both, truth + prediction - both); }
   double uncovered_share() const { return ratio(truth - both, truth); }
 
  private:
-  static double ratio(uint64_t part, uint64_t whole) { return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole); }
+  static double ratio(uint64_t part, uint64_t whole) {
+    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+  }
 };
 Outline compare_outlines(const Picture& prediction, const Picture& truth);
 
@@ -84,7 +92,8 @@ struct HighPass {
 HighPass high_pass(const Picture& prediction, const Picture& truth);
 HighPass high_pass(const Picture& prediction, const Picture& truth, const Box& inside);
 
-// The error of the best single colour c: sum over foreground of (true - (a c + (1 - a) grey))^2, minimised over c at the end.
+// The error of the best single colour c: sum over foreground of (true - (a c + (1 - a) grey))^2,
+// minimised over c at the end.
 class FlatColour {
  public:
   void add(const Picture& truth);

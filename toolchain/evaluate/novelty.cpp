@@ -15,7 +15,8 @@ namespace {
 constexpr double kCopyQuantile = 0.05;
 
 std::vector<NearestMember> nearest_of_rows(const RowMatrix& distances, bool skip_diagonal) {
-  if (distances.rows() == 0 || distances.cols() < (skip_diagonal ? 2 : 1)) throw InputError("novelty: nobody to be near to");
+  if (distances.rows() == 0 || distances.cols() < (skip_diagonal ? 2 : 1))
+    throw InputError("novelty: nobody to be near to");
   std::vector<NearestMember> nearest;
   for (Eigen::Index i = 0; i < distances.rows(); ++i) {
     NearestMember best{0, INFINITY};
@@ -36,23 +37,29 @@ std::vector<double> distances_of(const std::vector<NearestMember>& nearest) {
 }
 
 double share_up_to(const std::vector<double>& values, double limit) {
-  const auto count = std::count_if(values.begin(), values.end(), [&](double value) { return value <= limit; });
+  const auto count =
+      std::count_if(values.begin(), values.end(), [&](double value) { return value <= limit; });
   return static_cast<double>(count) / static_cast<double>(values.size());
 }
 
 }  // namespace
 
-std::vector<NearestMember> nearest_members(const RowMatrix& to_training) { return nearest_of_rows(to_training, false); }
+std::vector<NearestMember> nearest_members(const RowMatrix& to_training) {
+  return nearest_of_rows(to_training, false);
+}
 
 std::vector<NearestMember> nearest_other_members(const RowMatrix& training) {
-  if (training.rows() != training.cols()) throw InputError("novelty: distances of members to each other do not fit");
+  if (training.rows() != training.cols())
+    throw InputError("novelty: distances of members to each other do not fit");
   return nearest_of_rows(training, true);
 }
 
 Novelty measure_novelty(const RowMatrix& to_training, const RowMatrix& training) {
-  if (to_training.cols() != training.rows()) throw InputError("novelty: distances to members and of members do not fit");
+  if (to_training.cols() != training.rows())
+    throw InputError("novelty: distances to members and of members do not fit");
   Novelty novelty{nearest_members(to_training), nearest_other_members(training)};
-  const std::vector<double> samples = distances_of(novelty.samples), members = distances_of(novelty.training);
+  const std::vector<double> samples = distances_of(novelty.samples),
+                            members = distances_of(novelty.training);
   novelty.median_ratio = quantile(samples, 0.5) / quantile(members, 0.5);
   novelty.copy_distance = quantile(members, kCopyQuantile);
   novelty.copy_share = share_up_to(samples, novelty.copy_distance);
@@ -62,11 +69,15 @@ Novelty measure_novelty(const RowMatrix& to_training, const RowMatrix& training)
   return novelty;
 }
 
-std::vector<BlendShare> measure_blends(const RowMatrix& samples, const RowMatrix& training, size_t most) {
+std::vector<BlendShare> measure_blends(const RowMatrix& samples, const RowMatrix& training,
+                                       size_t most) {
   FIG_CHECK(most >= 1, "at least one member");
-  if (samples.rows() == 0 || training.rows() < 2) throw InputError("novelty: at least one sample and two members are needed");
-  if (samples.cols() != training.cols()) throw InputError("novelty: samples and members are of different sizes");
-  if (!samples.allFinite() || !training.allFinite()) throw InputError("novelty: a value is not finite");
+  if (samples.rows() == 0 || training.rows() < 2)
+    throw InputError("novelty: at least one sample and two members are needed");
+  if (samples.cols() != training.cols())
+    throw InputError("novelty: samples and members are of different sizes");
+  if (!samples.allFinite() || !training.allFinite())
+    throw InputError("novelty: a value is not finite");
   const auto members = static_cast<size_t>(training.rows());
   const size_t few = std::min(most, members);
   std::vector<BlendShare> shares(few + 1);
@@ -75,7 +86,8 @@ std::vector<BlendShare> measure_blends(const RowMatrix& samples, const RowMatrix
   const BlendSearch search(training);
   for (Eigen::Index s = 0; s < samples.rows(); ++s) {
     const Blends blends = search.closest(samples.row(s), few);
-    for (size_t k = 0; k < few; ++k) shares[k].residuals.push_back(blends.of_few[k].relative_residual);
+    for (size_t k = 0; k < few; ++k)
+      shares[k].residuals.push_back(blends.of_few[k].relative_residual);
     shares[few].residuals.push_back(blends.of_any.relative_residual);
   }
   for (BlendShare& share : shares) {

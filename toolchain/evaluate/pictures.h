@@ -1,4 +1,5 @@
-// Pictures of a trained avatar and of its person, and the boxes in them that metrics and contact sheets look at.
+// Pictures of a trained avatar and of its person, and the boxes in them that metrics and contact
+// sheets look at.
 #pragma once
 
 #include <cstdint>
@@ -19,10 +20,10 @@ PosedFrame pose_frame(train::TrainedAvatar& avatar, size_t frame);
 Picture render_picture(train::TrainedAvatar& avatar, const PosedFrame& posed, const Camera& camera);
 Picture true_picture(const dataset::Dataset& data, size_t frame, size_t camera);
 
-// The bounding box of the texels that `joints` move most, in the image; enlarged by a share of its sides. Empty if they are behind the
-// camera or outside.
-Box projected_box(const train::AvatarModel& model, const train::PosedBody& posed, const Camera& camera, std::span<const uint8_t> joints,
-                  float enlarge);
+// The bounding box of the texels that `joints` move most, in the image; enlarged by a share of its
+// sides. Empty if they are behind the camera or outside.
+Box projected_box(const train::AvatarModel& model, const train::PosedBody& posed,
+                  const Camera& camera, std::span<const uint8_t> joints, float enlarge);
 
 // Joints of SMPL-X.
 std::span<const uint8_t> head_joints();

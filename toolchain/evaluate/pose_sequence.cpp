@@ -15,7 +15,9 @@ constexpr float kRootTremble_m = 1e-3f;
 constexpr float kJointTremble_rad = 0.05f * 3.14159265f / 180;
 
 // Uniform in [-1, 1).
-float random_signed(uint64_t stream, uint64_t counter) { return 2 * train::random_unit(kTrembleSeed, stream, counter) - 1; }
+float random_signed(uint64_t stream, uint64_t counter) {
+  return 2 * train::random_unit(kTrembleSeed, stream, counter) - 1;
+}
 
 std::array<float, 4> normalised(std::array<float, 4> q) {
   const float length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -32,20 +34,25 @@ std::array<float, 4> interpolate(const float* a, const float* b, float t) {
 }
 
 std::array<float, 4> product(const float* a, const std::array<float, 4>& b) {
-  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+  return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+          a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+          a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+          a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
 }
 
 // A turn by kJointTremble_rad about a random axis.
 std::array<float, 4> tremble(uint64_t counter) {
   std::array<float, 3> axis;
   for (uint64_t k = 0; k < 3; ++k) axis[k] = random_signed(kAxisStream, 3 * counter + k);
-  const float length = std::max(1e-3f, std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]));
+  const float length =
+      std::max(1e-3f, std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]));
   const float sine = std::sin(kJointTremble_rad / 2) / length;
   return {std::cos(kJointTremble_rad / 2), sine * axis[0], sine * axis[1], sine * axis[2]};
 }
 
-bool is_foreground(const std::vector<float>& picture, size_t pixel) { return picture[4 * pixel + 3] > 0.5f; }
+bool is_foreground(const std::vector<float>& picture, size_t pixel) {
+  return picture[4 * pixel + 3] > 0.5f;
+}
 
 double over_grey(const std::vector<float>& picture, size_t pixel, int channel) {
   return picture[4 * pixel + channel] + (1 - picture[4 * pixel + 3]) * kMidGrey;
@@ -60,7 +67,9 @@ SquaredError error_of_changes(const FloatPictures* prediction, const FloatPictur
       if (!is_foreground(before, pixel) || !is_foreground(after, pixel)) continue;
       for (int c = 0; c < 3; ++c) {
         double change = over_grey(after, pixel, c) - over_grey(before, pixel, c);
-        if (prediction != nullptr) change -= over_grey((*prediction)[frame + 1], pixel, c) - over_grey((*prediction)[frame], pixel, c);
+        if (prediction != nullptr)
+          change -= over_grey((*prediction)[frame + 1], pixel, c) -
+                    over_grey((*prediction)[frame], pixel, c);
         error.sum += change * change;
       }
       error.count += 3;
@@ -71,7 +80,8 @@ SquaredError error_of_changes(const FloatPictures* prediction, const FloatPictur
 
 }  // namespace
 
-PoseSequence slow_motion(std::span<const train::OwnedPose> keys, uint32_t slower, const Camera& camera) {
+PoseSequence slow_motion(std::span<const train::OwnedPose> keys, uint32_t slower,
+                         const Camera& camera) {
   FIG_CHECK(keys.size() >= 2 && slower >= 1, "two key poses");
   PoseSequence sequence{"slow_motion", {}, camera};
   for (size_t key = 0; key + 1 < keys.size(); ++key) {
@@ -79,7 +89,9 @@ PoseSequence slow_motion(std::span<const train::OwnedPose> keys, uint32_t slower
     for (uint32_t step = 0; step < slower; ++step) {
       const float t = static_cast<float>(step) / static_cast<float>(slower);
       train::OwnedPose pose = a;
-      for (int k = 0; k < 3; ++k) pose.root_translation_m[k] = (1 - t) * a.root_translation_m[k] + t * b.root_translation_m[k];
+      for (int k = 0; k < 3; ++k)
+        pose.root_translation_m[k] =
+            (1 - t) * a.root_translation_m[k] + t * b.root_translation_m[k];
       for (size_t at = 0; at < pose.rotations.size(); at += 4) {
         const std::array<float, 4> q = interpolate(&a.rotations[at], &b.rotations[at], t);
         std::copy(q.begin(), q.end(), &pose.rotations[at]);
@@ -96,9 +108,11 @@ PoseSequence trembling_pose(const train::OwnedPose& pose, uint32_t frames, const
   const uint64_t joints = pose.rotations.size() / 4;
   for (uint64_t frame = 0; frame < frames; ++frame) {
     train::OwnedPose moved = pose;
-    for (uint64_t k = 0; k < 3; ++k) moved.root_translation_m[k] += kRootTremble_m * random_signed(kRootStream, 3 * frame + k);
+    for (uint64_t k = 0; k < 3; ++k)
+      moved.root_translation_m[k] += kRootTremble_m * random_signed(kRootStream, 3 * frame + k);
     for (uint64_t joint = 0; joint < joints; ++joint) {
-      const std::array<float, 4> q = product(&pose.rotations[4 * joint], tremble(frame * joints + joint));
+      const std::array<float, 4> q =
+          product(&pose.rotations[4 * joint], tremble(frame * joints + joint));
       std::copy(q.begin(), q.end(), &moved.rotations[4 * joint]);
     }
     sequence.poses.push_back(std::move(moved));
@@ -110,7 +124,8 @@ FloatPictures render_sequence(train::TrainedAvatar& avatar, const PoseSequence& 
   FloatPictures pictures;
   for (const train::OwnedPose& pose : sequence.poses) {
     const train::PosedBody posed = avatar.model().pose(pose.view());
-    pictures.push_back(avatar.model().render_rgba(avatar.model().evaluate(posed), posed, sequence.camera));
+    pictures.push_back(
+        avatar.model().render_rgba(avatar.model().evaluate(posed), posed, sequence.camera));
   }
   return pictures;
 }

@@ -9,7 +9,8 @@ namespace figurine::evaluate {
 
 namespace {
 
-constexpr size_t kFramedOn = 24;  // training members; one who stands out of all of them may be cut at the margin
+constexpr size_t kFramedOn =
+    24;  // training members; one who stands out of all of them may be cut at the margin
 constexpr float kMargin = 0.06f;
 constexpr float kLowest_deg = -5, kHighest_deg = 25;
 enum Stream : uint64_t { kTurn = 101, kElevation = 102 };  // not those of the network
@@ -19,17 +20,21 @@ std::vector<Shot> scatter_shots(const PosedStudioOptions& options) {
   for (size_t pose = 0; pose < options.poses; ++pose) {
     const float turn = train::random_unit(options.seed, kTurn, options.first_pose + pose);
     for (size_t view = 0; view < options.views; ++view) {
-      const float raised = train::random_unit(options.seed, kElevation, (options.first_pose + pose) * options.views + view);
+      const float raised = train::random_unit(options.seed, kElevation,
+                                              (options.first_pose + pose) * options.views + view);
       shots.push_back({.pose = pose,
-                       .azimuth_deg = 360 * (static_cast<float>(view) + turn) / static_cast<float>(options.views),
+                       .azimuth_deg = 360 * (static_cast<float>(view) + turn) /
+                                      static_cast<float>(options.views),
                        .elevation_deg = kLowest_deg + raised * (kHighest_deg - kLowest_deg)});
     }
   }
   return shots;
 }
 
-std::vector<train::OwnedPose> choose_poses(const Population& population, const PosedStudioOptions& options) {
-  std::vector<train::OwnedPose> poses = fixed_poses(population, options.motion, options.first_pose + options.poses);
+std::vector<train::OwnedPose> choose_poses(const Population& population,
+                                           const PosedStudioOptions& options) {
+  std::vector<train::OwnedPose> poses =
+      fixed_poses(population, options.motion, options.first_pose + options.poses);
   poses.erase(poses.begin(), poses.begin() + static_cast<std::ptrdiff_t>(options.first_pose));
   return poses;
 }
@@ -52,13 +57,18 @@ std::vector<size_t> members_of(const Population& population, Split split) {
   return members;
 }
 
-PosedStudio::PosedStudio(const Package& population, const Package& body, const PosedStudioOptions& options)
-    : population_(&population.population()), options_(options), picture_px_(std::clamp(2 * population_->network.input_size, 128u, 256u)) {
+PosedStudio::PosedStudio(const Package& population, const Package& body,
+                         const PosedStudioOptions& options)
+    : population_(&population.population()),
+      options_(options),
+      picture_px_(std::clamp(2 * population_->network.input_size, 128u, 256u)) {
   const std::vector<size_t> training = members_of(*population_, Split::kTrain);
   const std::string where = "population '" + population_->name + "'";
   if (training.size() < 2)
-    throw InputError(where + ": has " + std::to_string(training.size()) + " training members, at least 2 are needed");
-  throw_if_error(check_avatar_fits_body(OpenedMember(*population_, training[0]).avatar, body), where);
+    throw InputError(where + ": has " + std::to_string(training.size()) +
+                     " training members, at least 2 are needed");
+  throw_if_error(check_avatar_fits_body(OpenedMember(*population_, training[0]).avatar, body),
+                 where);
   studio_.emplace(body, choose_poses(*population_, options), scatter_shots(options));
   const std::vector<size_t> framed_on = thin_out(training, kFramedOn);
   std::vector<std::vector<Extent>> extents(framed_on.size());
@@ -68,7 +78,8 @@ PosedStudio::PosedStudio(const Package& population, const Package& body, const P
   for (size_t shot = 0; shot < shots(); ++shot) {
     Extent all;
     for (const std::vector<Extent>& own : extents) all.add(own[shot]);
-    if (!(all.right > all.left && all.bottom > all.top)) throw InputError(where + ": its members cannot be seen");
+    if (!(all.right > all.left && all.bottom > all.top))
+      throw InputError(where + ": its members cannot be seen");
     studio_->frame(shot, all, picture_px_, picture_px_, kMargin);
   }
 }

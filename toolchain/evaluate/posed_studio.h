@@ -1,5 +1,6 @@
-// Members of a population in many poses, each seen from several sides: what figurine-features learns from and is judged by. Poses, cameras
-// and their framing come from training members alone; which members are drawn is the caller's choice.
+// Members of a population in many poses, each seen from several sides: what figurine-features
+// learns from and is judged by. Poses, cameras and their framing come from training members alone;
+// which members are drawn is the caller's choice.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +16,9 @@
 namespace figurine::evaluate {
 
 struct PosedStudioOptions {
-  const Motion* motion = nullptr;  // whose poses are drawn; without: golden poses of training members
-  size_t first_pose = 0;           // of fixed_poses(first_pose + poses)
+  const Motion* motion =
+      nullptr;            // whose poses are drawn; without: golden poses of training members
+  size_t first_pose = 0;  // of fixed_poses(first_pose + poses)
   size_t poses = 8, views = 6;
   uint64_t seed = 1;  // of the cameras
   uint32_t threads = 1;
@@ -28,7 +30,8 @@ std::vector<size_t> members_of(const Population& population, Split split);
 
 class PosedStudio {
  public:
-  // Both packages are borrowed. Throws InputError if they do not fit, or if nothing can be seen; Interrupted.
+  // Both packages are borrowed. Throws InputError if they do not fit, or if nothing can be seen;
+  // Interrupted.
   PosedStudio(const Package& population, const Package& body, const PosedStudioOptions& options);
 
   size_t shots() const { return options_.poses * options_.views; }
@@ -37,7 +40,8 @@ class PosedStudio {
   uint32_t picture_px() const { return picture_px_; }  // side
 
   // take(i, pictures of members[i], one a shot), several at a time on different threads.
-  void draw(const std::string& what, std::span<const size_t> members, const std::function<void(size_t, std::vector<Picture>)>& take) const;
+  void draw(const std::string& what, std::span<const size_t> members,
+            const std::function<void(size_t, std::vector<Picture>)>& take) const;
 
  private:
   const Population* population_;

@@ -28,7 +28,8 @@ std::vector<size_t> RandomStream::distinct(size_t m, size_t count) const {
 void RandomStream::fill_normal(std::span<double> values) const {
   for (size_t i = 0; i < values.size(); i += 4) {
     const std::array<double, 4> normal = stream_normals(seed_, stream_, i / 4);
-    std::copy_n(normal.begin(), std::min<size_t>(4, values.size() - i), values.begin() + static_cast<std::ptrdiff_t>(i));
+    std::copy_n(normal.begin(), std::min<size_t>(4, values.size() - i),
+                values.begin() + static_cast<std::ptrdiff_t>(i));
   }
 }
 

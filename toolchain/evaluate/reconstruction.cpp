@@ -14,7 +14,8 @@ namespace figurine::evaluate {
 
 namespace {
 
-constexpr float kHeadEnlarge = 0.15f;  // hair and beard stand out from the skin that the box is drawn around
+constexpr float kHeadEnlarge =
+    0.15f;  // hair and beard stand out from the skin that the box is drawn around
 
 struct Group {
   SquaredError foreground, crop, head;
@@ -38,7 +39,9 @@ struct Group {
 };
 
 // JSON has no infinity and no NaN: equal pictures and absent pixels become null.
-nlohmann::json finite(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+nlohmann::json finite(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
 
 nlohmann::json to_json(const Group& group) {
   return {{"images", group.images},
@@ -71,7 +74,8 @@ std::vector<std::string> groups_of(dataset::Role role) {
 
 }  // namespace
 
-nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar, const ReconstructionOptions& options) {
+nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
+                                       const ReconstructionOptions& options) {
   const dataset::Dataset& data = avatar.data();
   const size_t cameras = data.cameras().size(), frames = data.frames().size();
   std::map<std::string, Group> groups;
@@ -87,7 +91,8 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar, const Recon
   size_t training_frames = 0;
   for (size_t frame = 0; frame < frames; ++frame) {
     const dataset::FrameSplit split = data.frames()[frame].split;
-    if (split == dataset::FrameSplit::kTrain && training_frames++ % options.view_frame_step != 0) continue;
+    if (split == dataset::FrameSplit::kTrain && training_frames++ % options.view_frame_step != 0)
+      continue;
     std::optional<PosedFrame> posed;
     for (size_t camera = 0; camera < cameras; ++camera) {
       const dataset::Role role = data.role(frame, camera);
@@ -97,29 +102,36 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar, const Recon
       const Camera& view = data.cameras()[camera].camera;
       const Picture prediction = render_picture(avatar, *posed, view);
       const Picture truth = true_picture(data, frame, camera);
-      const Box head_box = projected_box(avatar.model(), posed->posed, view, head_joints(), kHeadEnlarge);
+      const Box head_box =
+          projected_box(avatar.model(), posed->posed, view, head_joints(), kHeadEnlarge);
       for (const std::string& name : groups_of(role)) groups[name].add(prediction, truth, head_box);
       if (split == dataset::FrameSplit::kBlock) {
         std::optional<Before>& last = before[camera];
-        if (last && last->frame + 1 == frame) difference.add(difference_error(last->prediction, prediction, last->truth, truth));
+        if (last && last->frame + 1 == frame)
+          difference.add(difference_error(last->prediction, prediction, last->truth, truth));
         last = Before{frame, prediction, truth};
       }
     }
-    progress.show(double(frame + 1) / double(frames), "frame " + std::to_string(frame + 1) + " of " + std::to_string(frames));
+    progress.show(double(frame + 1) / double(frames),
+                  "frame " + std::to_string(frame + 1) + " of " + std::to_string(frames));
   }
-  if (groups.empty()) throw InputError(data.directory() + ": nothing is held out, so there is nothing to evaluate");
+  if (groups.empty())
+    throw InputError(data.directory() + ": nothing is held out, so there is nothing to evaluate");
   nlohmann::json report = nlohmann::json::object();
-  for (const char* name :
-       {"held_out_views", "held_out_poses", "held_out_poses_interleaved", "held_out_poses_block", "held_out_views_and_poses"}) {
+  for (const char* name : {"held_out_views", "held_out_poses", "held_out_poses_interleaved",
+                           "held_out_poses_block", "held_out_views_and_poses"}) {
     report[name] = to_json(groups[name]);
   }
   report["difference_psnr_db"] = finite(difference.psnr_db());
   report["definition"] =
-      "PSNR over pixels whose true alpha exceeds 0.5, on stored sRGB values, over mid-grey, pooled MSE; flat: one colour with a perfect "
+      "PSNR over pixels whose true alpha exceeds 0.5, on stored sRGB values, over mid-grey, pooled "
+      "MSE; flat: one colour with a perfect "
       "mask; crop: bounding box "
-      "of the mask, over black; head: projected box of the head's texels, 15 % larger; high-pass: energy of (picture - 3x3 binomial) "
+      "of the mask, over black; head: projected box of the head's texels, 15 % larger; high-pass: "
+      "energy of (picture - 3x3 binomial) "
       "inside the mask, "
-      "prediction over truth; difference: PSNR of consecutive frames' differences in the held-out block";
+      "prediction over truth; difference: PSNR of consecutive frames' differences in the held-out "
+      "block";
   return report;
 }
 

@@ -9,11 +9,14 @@
 
 namespace figurine::evaluate {
 
-nlohmann::json evaluate_requantization(train::TrainedAvatar& avatar, const Avatar& member, const RequantizationOptions& options) {
+nlohmann::json evaluate_requantization(train::TrainedAvatar& avatar, const Avatar& member,
+                                       const RequantizationOptions& options) {
   if (member.body_hash != avatar.body_file().package.content_hash()) {
-    throw InputError("member '" + member.name + "': was made for body " + format_hash(member.body_hash) + ", the run for another");
+    throw InputError("member '" + member.name + "': was made for body " +
+                     format_hash(member.body_hash) + ", the run for another");
   }
-  const ReconstructionOptions reconstruction{.quiet = options.quiet, .view_frame_step = options.view_frame_step};
+  const ReconstructionOptions reconstruction{.quiet = options.quiet,
+                                             .view_frame_step = options.view_frame_step};
   model::PoseUNet& unet = avatar.model().unet();
   std::vector<float> storage;
   const Network own = unet.export_network(storage);
@@ -22,11 +25,14 @@ nlohmann::json evaluate_requantization(train::TrainedAvatar& avatar, const Avata
   const nlohmann::json after = evaluate_reconstruction(avatar, reconstruction);
   unet.import_network(own);
   nlohmann::json report;
-  for (const auto& [name, group] : {std::pair{"views", "held_out_views"}, std::pair{"poses", "held_out_poses"}}) {
+  for (const auto& [name, group] :
+       {std::pair{"views", "held_out_views"}, std::pair{"poses", "held_out_poses"}}) {
     const nlohmann::json &a = before.at(group).at("psnr_db"), &b = after.at(group).at("psnr_db");
     const bool measured = a.is_number() && b.is_number();
     report[name] = {
-        {"psnr_db", a}, {"member_psnr_db", b}, {"loss_db", measured ? nlohmann::json(a.get<double>() - b.get<double>()) : nullptr}};
+        {"psnr_db", a},
+        {"member_psnr_db", b},
+        {"loss_db", measured ? nlohmann::json(a.get<double>() - b.get<double>()) : nullptr}};
   }
   return report;
 }

@@ -1,5 +1,5 @@
-// What a population's rounding costs: a run's own weights and the same person's member of the population, both in float arithmetic, against
-// the truth of the held-out views and poses.
+// What a population's rounding costs: a run's own weights and the same person's member of the
+// population, both in float arithmetic, against the truth of the held-out views and poses.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -14,8 +14,10 @@ struct RequantizationOptions {
   bool quiet = false;
 };
 
-// {"views", "poses"}, each {"psnr_db", "member_psnr_db", "loss_db"}: pooled, as evaluate_reconstruction has them. The run's model keeps its
-// own weights. Throws InputError if the member's network is of another shape.
-nlohmann::json evaluate_requantization(train::TrainedAvatar& avatar, const Avatar& member, const RequantizationOptions& options);
+// {"views", "poses"}, each {"psnr_db", "member_psnr_db", "loss_db"}: pooled, as
+// evaluate_reconstruction has them. The run's model keeps its own weights. Throws InputError if the
+// member's network is of another shape.
+nlohmann::json evaluate_requantization(train::TrainedAvatar& avatar, const Avatar& member,
+                                       const RequantizationOptions& options);
 
 }  // namespace figurine::evaluate

@@ -33,25 +33,30 @@ struct Sitting {
   size_t shots() const { return pictures[0].size(); }
 };
 
-Sitting draw_sitting(const PosedStudio& studio, const std::string& what, const std::vector<size_t>& members) {
+Sitting draw_sitting(const PosedStudio& studio, const std::string& what,
+                     const std::vector<size_t>& members) {
   Sitting sitting;
   sitting.pictures.resize(members.size());
-  studio.draw(what, members, [&](size_t i, std::vector<Picture> pictures) { sitting.pictures[i] = std::move(pictures); });
+  studio.draw(what, members, [&](size_t i, std::vector<Picture> pictures) {
+    sitting.pictures[i] = std::move(pictures);
+  });
   for (size_t a = 0; a < studio.shots(); ++a) {
     for (size_t b = 0; b < studio.shots(); ++b) {
-      if (studio.pose_of(a) != studio.pose_of(b) && studio.view_of(a) != studio.view_of(b)) sitting.shot_pairs.emplace_back(a, b);
+      if (studio.pose_of(a) != studio.pose_of(b) && studio.view_of(a) != studio.view_of(b))
+        sitting.shot_pairs.emplace_back(a, b);
     }
   }
   return sitting;
 }
 
-// Share of the queries whose nearest gallery picture shows the same person. distances: [queries, gallery], the same people in one order.
-// Ties count against it.
+// Share of the queries whose nearest gallery picture shows the same person. distances: [queries,
+// gallery], the same people in one order. Ties count against it.
 double rank_one(const RowMatrix& distances) {
   size_t found = 0;
   for (Eigen::Index i = 0; i < distances.rows(); ++i) {
     bool nearest = true;
-    for (Eigen::Index j = 0; j < distances.cols(); ++j) nearest &= j == i || distances(i, i) < distances(i, j);
+    for (Eigen::Index j = 0; j < distances.cols(); ++j)
+      nearest &= j == i || distances(i, i) < distances(i, j);
     found += nearest ? 1 : 0;
   }
   return static_cast<double>(found) / static_cast<double>(distances.rows());
@@ -60,10 +65,12 @@ double rank_one(const RowMatrix& distances) {
 // distances(query shot, gallery shot) of everybody to everybody.
 using ShotDistances = std::function<RowMatrix(size_t, size_t)>;
 
-double mean_rank_one(const Sitting& sitting, const Crew& crew, const std::string& what, const ShotDistances& distances) {
+double mean_rank_one(const Sitting& sitting, const Crew& crew, const std::string& what,
+                     const ShotDistances& distances) {
   std::vector<double> found(sitting.shot_pairs.size());
-  crew.run(what, found.size(),
-           [&](size_t i) { found[i] = rank_one(distances(sitting.shot_pairs[i].first, sitting.shot_pairs[i].second)); });
+  crew.run(what, found.size(), [&](size_t i) {
+    found[i] = rank_one(distances(sitting.shot_pairs[i].first, sitting.shot_pairs[i].second));
+  });
   double sum = 0;
   for (const double share : found) sum += share;
   return sum / static_cast<double>(found.size());
@@ -80,21 +87,27 @@ RowMatrix all_pairs(size_t members, Pair&& pair) {
   return distances;
 }
 
-double rank_one_of_features(const FeatureNetwork& network, const Sitting& sitting, uint32_t threads, const Crew& crew) {
+double rank_one_of_features(const FeatureNetwork& network, const Sitting& sitting, uint32_t threads,
+                            const Crew& crew) {
   std::vector<RowMatrix> features;
-  for (size_t shot = 0; shot < sitting.shots(); ++shot) features.push_back(network.features(sitting.shot(shot), threads));
+  for (size_t shot = 0; shot < sitting.shots(); ++shot)
+    features.push_back(network.features(sitting.shot(shot), threads));
   return mean_rank_one(sitting, crew, "comparing features", [&](size_t a, size_t b) {
-    return all_pairs(sitting.members(),
-                     [&](Eigen::Index i, Eigen::Index j) { return (features[a].row(i) - features[b].row(j)).squaredNorm(); });
+    return all_pairs(sitting.members(), [&](Eigen::Index i, Eigen::Index j) {
+      return (features[a].row(i) - features[b].row(j)).squaredNorm();
+    });
   });
 }
 
-double rank_one_of_distances(const PerceptualNetwork& network, const Sitting& sitting, uint32_t threads, const Crew& crew) {
+double rank_one_of_distances(const PerceptualNetwork& network, const Sitting& sitting,
+                             uint32_t threads, const Crew& crew) {
   std::vector<std::vector<std::vector<float>>> embeddings;
-  for (size_t shot = 0; shot < sitting.shots(); ++shot) embeddings.push_back(network.embed(sitting.shot(shot), threads));
+  for (size_t shot = 0; shot < sitting.shots(); ++shot)
+    embeddings.push_back(network.embed(sitting.shot(shot), threads));
   return mean_rank_one(sitting, crew, "comparing activations", [&](size_t a, size_t b) {
     return all_pairs(sitting.members(), [&](Eigen::Index i, Eigen::Index j) {
-      return embedding_distance(embeddings[a][static_cast<size_t>(i)], embeddings[b][static_cast<size_t>(j)]);
+      return embedding_distance(embeddings[a][static_cast<size_t>(i)],
+                                embeddings[b][static_cast<size_t>(j)]);
     });
   });
 }
@@ -102,33 +115,41 @@ double rank_one_of_distances(const PerceptualNetwork& network, const Sitting& si
 double rank_one_of_pixels(const Sitting& sitting, const Crew& crew) {
   return mean_rank_one(sitting, crew, "comparing pixels", [&](size_t a, size_t b) {
     return all_pairs(sitting.members(), [&](Eigen::Index i, Eigen::Index j) {
-      return union_error(sitting.pictures[static_cast<size_t>(i)][a], sitting.pictures[static_cast<size_t>(j)][b]).mse();
+      return union_error(sitting.pictures[static_cast<size_t>(i)][a],
+                         sitting.pictures[static_cast<size_t>(j)][b])
+          .mse();
     });
   });
 }
 
 // Mean over pictures of the distance between the i-th of both.
-double mean_distance(const PerceptualNetwork& network, const RgbPictures& a, const RgbPictures& b, uint32_t threads) {
-  const std::vector<std::vector<float>> x = network.embed(a, threads), y = network.embed(b, threads);
+double mean_distance(const PerceptualNetwork& network, const RgbPictures& a, const RgbPictures& b,
+                     uint32_t threads) {
+  const std::vector<std::vector<float>> x = network.embed(a, threads),
+                                        y = network.embed(b, threads);
   double sum = 0;
   for (size_t i = 0; i < x.size(); ++i) sum += embedding_distance(x[i], y[i]);
   return sum / static_cast<double>(x.size());
 }
 
 // What a number of the distance means: between people, between poses, and after blur and noise.
-nlohmann::json scale_of(const PerceptualNetwork& network, const Sitting& sitting, const RetrievalOptions& options) {
+nlohmann::json scale_of(const PerceptualNetwork& network, const Sitting& sitting,
+                        const RetrievalOptions& options) {
   const RgbPictures pictures = sitting.shot(0);
   const RowMatrix people = network.distances(pictures, pictures, options.threads);
   const double pairs = static_cast<double>(people.rows() * (people.rows() - 1));
   const RgbPictures posed = sitting.shot(sitting.shot_pairs.front().second);
   nlohmann::json blur = nlohmann::json::array(), noise = nlohmann::json::array();
   for (const double deviation : kBlurs_px) {
-    blur.push_back(
-        {{"deviation_px", deviation}, {"distance", mean_distance(network, pictures, blurred(pictures, deviation), options.threads)}});
+    blur.push_back({{"deviation_px", deviation},
+                    {"distance", mean_distance(network, pictures, blurred(pictures, deviation),
+                                               options.threads)}});
   }
   for (const double deviation : kNoises) {
-    noise.push_back({{"deviation", deviation},
-                     {"distance", mean_distance(network, pictures, noisy(pictures, deviation, options.seed), options.threads)}});
+    noise.push_back(
+        {{"deviation", deviation},
+         {"distance", mean_distance(network, pictures, noisy(pictures, deviation, options.seed),
+                                    options.threads)}});
   }
   return {{"other_person_same_shot", people.sum() / pairs},
           {"same_person_other_shot", mean_distance(network, pictures, posed, options.threads)},
@@ -136,10 +157,12 @@ nlohmann::json scale_of(const PerceptualNetwork& network, const Sitting& sitting
           {"noise", std::move(noise)}};
 }
 
-nlohmann::json measure(const Sitting& sitting, const ComparingNetworks& networks, const RetrievalOptions& options) {
+nlohmann::json measure(const Sitting& sitting, const ComparingNetworks& networks,
+                       const RetrievalOptions& options) {
   const Crew crew(options.threads, options.quiet);
   nlohmann::json features = nlohmann::json::object(), distance = nlohmann::json::object();
-  for (const auto& network : networks.features) features[network->name()] = rank_one_of_features(*network, sitting, options.threads, crew);
+  for (const auto& network : networks.features)
+    features[network->name()] = rank_one_of_features(*network, sitting, options.threads, crew);
   for (const auto& network : networks.perceptual) {
     distance[network->name()] = rank_one_of_distances(*network, sitting, options.threads, crew);
   }
@@ -159,15 +182,20 @@ std::vector<size_t> held_out_members(const Population& population) {
 }
 
 // Provenance proves that nobody learnt from whom it is judged by.
-void check_not_learnt_from(const nlohmann::json& network, const Package& population, const std::vector<size_t>& held_out) {
+void check_not_learnt_from(const nlohmann::json& network, const Package& population,
+                           const std::vector<size_t>& held_out) {
   const nlohmann::json provenance = network.value("provenance", nlohmann::json::object());
   if (provenance.value("population_hash", "") != format_hash(population.content_hash())) return;
-  const nlohmann::json members = nlohmann::json::parse(provenance.value("members", "[]"), nullptr, false);
+  const nlohmann::json members =
+      nlohmann::json::parse(provenance.value("members", "[]"), nullptr, false);
   std::set<std::string> learnt;
-  for (const nlohmann::json& member : members) learnt.insert(member.is_string() ? member.get<std::string>() : "");
+  for (const nlohmann::json& member : members)
+    learnt.insert(member.is_string() ? member.get<std::string>() : "");
   for (const size_t member : held_out) {
     const std::string& name = population.population().members[member].name;
-    if (learnt.contains(name)) throw InputError(network.value("file", "") + ": members: learnt from '" + name + "', who is held out");
+    if (learnt.contains(name))
+      throw InputError(network.value("file", "") + ": members: learnt from '" + name +
+                       "', who is held out");
   }
 }
 
@@ -191,7 +219,8 @@ RgbPictures blurred(const RgbPictures& pictures, double deviation_px) {
     for (int64_t i = 0; i < count; ++i) {
       double value = 0;
       for (int64_t k = -radius; k <= radius; ++k) {
-        value += kernel[static_cast<size_t>(k + radius)] * copy[static_cast<size_t>(std::clamp<int64_t>(i + k, 0, count - 1))];
+        value += kernel[static_cast<size_t>(k + radius)] *
+                 copy[static_cast<size_t>(std::clamp<int64_t>(i + k, 0, count - 1))];
       }
       line[i * stride] = static_cast<float>(value / sum);
     }
@@ -207,7 +236,8 @@ RgbPictures blurred(const RgbPictures& pictures, double deviation_px) {
 RgbPictures noisy(const RgbPictures& pictures, double deviation, uint64_t seed) {
   RgbPictures out = pictures;
   for (size_t i = 0; i < out.values.size(); ++i) {
-    const double u = 1 - double(train::random_unit(seed, 201, i)), v = train::random_unit(seed, 202, i);  // Box-Muller; u is never 0
+    const double u = 1 - double(train::random_unit(seed, 201, i)),
+                 v = train::random_unit(seed, 202, i);  // Box-Muller; u is never 0
     const double normal = std::sqrt(-2 * std::log(u)) * std::cos(kTwoPi * v);
     out.values[i] = static_cast<float>(std::clamp(out.values[i] + deviation * normal, 0.0, 1.0));
   }
@@ -218,11 +248,13 @@ nlohmann::json describe_networks(const ComparingNetworks& networks, const Packag
   nlohmann::json described = nlohmann::json::object();
   for (const auto& network : networks.features) described[network->name()] = network->describe();
   for (const auto& network : networks.perceptual) described[network->name()] = network->describe();
-  for (const nlohmann::json& network : described) check_not_learnt_from(network, population, held_out_members(population.population()));
+  for (const nlohmann::json& network : described)
+    check_not_learnt_from(network, population, held_out_members(population.population()));
   return described;
 }
 
-nlohmann::json evaluate_networks(const Package& population, const Package& body, const ComparingNetworks& networks,
+nlohmann::json evaluate_networks(const Package& population, const Package& body,
+                                 const ComparingNetworks& networks,
                                  const RetrievalOptions& options) {
   const Population& people = population.population();
   const std::vector<size_t> held_out = held_out_members(people);
@@ -243,12 +275,16 @@ nlohmann::json evaluate_networks(const Package& population, const Package& body,
   training.resize(std::min(training.size(), held_out.size()));
   const Sitting strangers = draw_sitting(studio, "drawing held-out members", held_out);
   nlohmann::json scales = nlohmann::json::object();
-  for (const auto& network : networks.perceptual) scales[network->name()] = scale_of(*network, strangers, options);
-  nlohmann::json report{{"networks", std::move(described)},
-                        {"pictures", {{"poses", options.poses}, {"views", options.views}, {"size", studio.picture_px()}}},
-                        {"held_out", measure(strangers, networks, options)},
-                        {"training", measure(draw_sitting(studio, "drawing training members", training), networks, options)},
-                        {"scale", std::move(scales)}};
+  for (const auto& network : networks.perceptual)
+    scales[network->name()] = scale_of(*network, strangers, options);
+  nlohmann::json report{
+      {"networks", std::move(described)},
+      {"pictures",
+       {{"poses", options.poses}, {"views", options.views}, {"size", studio.picture_px()}}},
+      {"held_out", measure(strangers, networks, options)},
+      {"training",
+       measure(draw_sitting(studio, "drawing training members", training), networks, options)},
+      {"scale", std::move(scales)}};
   return report;
 }
 

@@ -6,7 +6,8 @@
 
 namespace figurine::evaluate {
 
-SoloThreads::SoloThreads(uint32_t threads) : before_(at::get_num_threads()), lanes_(threads, [] { at::set_num_threads(1); }) {
+SoloThreads::SoloThreads(uint32_t threads)
+    : before_(at::get_num_threads()), lanes_(threads, [] { at::set_num_threads(1); }) {
   at::set_num_threads(1);
 }
 

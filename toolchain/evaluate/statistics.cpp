@@ -13,7 +13,8 @@ constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<double> finite_of(std::span<const double> values) {
   std::vector<double> finite;
-  std::copy_if(values.begin(), values.end(), std::back_inserter(finite), [](double value) { return std::isfinite(value); });
+  std::copy_if(values.begin(), values.end(), std::back_inserter(finite),
+               [](double value) { return std::isfinite(value); });
   return finite;
 }
 
@@ -29,7 +30,8 @@ std::vector<double> ranks_of(const std::vector<double>& values) {
   for (size_t first = 0; first < order.size();) {
     size_t end = first;
     while (end < order.size() && values[order[end]] == values[order[first]]) ++end;
-    for (size_t i = first; i < end; ++i) ranks[order[i]] = 0.5 * static_cast<double>(first + end - 1);
+    for (size_t i = first; i < end; ++i)
+      ranks[order[i]] = 0.5 * static_cast<double>(first + end - 1);
     first = end;
   }
   return ranks;
@@ -70,7 +72,8 @@ Summary summarise(std::span<const double> values) {
   const double mean = mean_of(finite);
   double squares = 0;
   for (const double value : finite) squares += (value - mean) * (value - mean);
-  return {finite.size(), mean, *least, *greatest, std::sqrt(squares / static_cast<double>(finite.size()))};
+  return {finite.size(), mean, *least, *greatest,
+          std::sqrt(squares / static_cast<double>(finite.size()))};
 }
 
 double quantile(std::vector<double> values, double share) {
@@ -83,7 +86,8 @@ double quantile(std::vector<double> values, double share) {
   return values[below] + (place - static_cast<double>(below)) * (values[above] - values[below]);
 }
 
-std::vector<size_t> histogram(std::span<const double> values, double low, double high, size_t bins) {
+std::vector<size_t> histogram(std::span<const double> values, double low, double high,
+                              size_t bins) {
   std::vector<size_t> counts(bins, 0);
   for (const double value : finite_of(values)) {
     const double place = high > low ? (value - low) / (high - low) * static_cast<double>(bins) : 0;

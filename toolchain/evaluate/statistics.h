@@ -1,4 +1,5 @@
-// Summaries of lists of numbers for reports. Values that are not finite (not measured) are left out.
+// Summaries of lists of numbers for reports. Values that are not finite (not measured) are left
+// out.
 #pragma once
 
 #include <cstddef>
@@ -22,6 +23,7 @@ std::vector<size_t> histogram(std::span<const double> values, double low, double
 
 // Of pairs whose both values are finite; NaN below two pairs or without any variance.
 double pearson_correlation(std::span<const double> x, std::span<const double> y);
-double spearman_correlation(std::span<const double> x, std::span<const double> y);  // of ranks, ties sharing their mean rank
+double spearman_correlation(std::span<const double> x,
+                            std::span<const double> y);  // of ranks, ties sharing their mean rank
 
 }  // namespace figurine::evaluate

@@ -31,7 +31,9 @@ constexpr AlexNetLayer kAlexNet[] = {{"net.slice1.0", 3, 64, 11, 4, 2, false},
                                      {"net.slice4.8", 384, 256, 3, 1, 1, false},
                                      {"net.slice5.10", 256, 256, 3, 1, 1, false}};
 
-std::string channel_weights_name(size_t layer) { return "lin" + std::to_string(layer) + ".model.1.weight"; }
+std::string channel_weights_name(size_t layer) {
+  return "lin" + std::to_string(layer) + ".model.1.weight";
+}
 
 std::string message_of(const std::exception& error) {
   const auto* torch_error = dynamic_cast<const c10::Error*>(&error);
@@ -40,7 +42,8 @@ std::string message_of(const std::exception& error) {
 
 torch::jit::Module load_script(const std::string& path) {
   // What cannot be read is told apart from what is no script.
-  if (const auto file = ports::MappedFile::open(path); !file.ok()) throw InputError(file.status().message());
+  if (const auto file = ports::MappedFile::open(path); !file.ok())
+    throw InputError(file.status().message());
   try {
     torch::jit::Module module = torch::jit::load(path, torch::kCPU);
     module.eval();
@@ -73,12 +76,13 @@ class NamedArrays {
       const auto found = script_.find(name);
       if (found == script_.end()) throw InputError(path_ + ": " + name + ": no such parameter");
       if (found->second.sizes() != at::IntArrayRef(shape)) {
-        throw InputError(path_ + ": " + name + ": shape " + c10::str(found->second.sizes()) + ", expected " +
-                         c10::str(at::IntArrayRef(shape)));
+        throw InputError(path_ + ": " + name + ": shape " + c10::str(found->second.sizes()) +
+                         ", expected " + c10::str(at::IntArrayRef(shape)));
       }
       tensor = found->second.detach().to(torch::kFloat32).contiguous().clone();
     }
-    if (!torch::isfinite(tensor).all().item<bool>()) throw InputError(path_ + ": " + name + ": holds a value that is not finite");
+    if (!torch::isfinite(tensor).all().item<bool>())
+      throw InputError(path_ + ": " + name + ": holds a value that is not finite");
     return tensor;
   }
 
@@ -88,7 +92,9 @@ class NamedArrays {
   std::map<std::string, torch::Tensor> script_;
 };
 
-std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
+std::string file_name(const std::string& path) {
+  return std::filesystem::path(path).filename().string();
+}
 
 }  // namespace
 
@@ -114,11 +120,13 @@ LpipsAlex LpipsAlex::load(const std::string& path) {
   for (size_t l = 0; l < std::size(kAlexNet); ++l) {
     const AlexNetLayer& layer = kAlexNet[l];
     const std::string name = layer.name;
-    weights->weight.push_back(arrays.read(name + ".weight", {layer.out, layer.in, layer.kernel, layer.kernel}));
+    weights->weight.push_back(
+        arrays.read(name + ".weight", {layer.out, layer.in, layer.kernel, layer.kernel}));
     weights->bias.push_back(arrays.read(name + ".bias", {layer.out}));
     const torch::Tensor channel = arrays.read(channel_weights_name(l), {1, layer.out, 1, 1});
     if (channel.min().item<float>() < 0) {
-      throw InputError(path + ": " + channel_weights_name(l) + ": holds a negative weight, which LPIPS cannot have");
+      throw InputError(path + ": " + channel_weights_name(l) +
+                       ": holds a negative weight, which LPIPS cannot have");
     }
     weights->distance.push_back({.channels = channel.view({layer.out})});
   }
@@ -127,19 +135,22 @@ LpipsAlex LpipsAlex::load(const std::string& path) {
 
 const std::string& LpipsAlex::name() const { return weights_->name; }
 
-nlohmann::json LpipsAlex::describe() const { return {{"name", weights_->name}, {"file", weights_->file}, {"hash", weights_->hash}}; }
+nlohmann::json LpipsAlex::describe() const {
+  return {{"name", weights_->name}, {"file", weights_->file}, {"hash", weights_->hash}};
+}
 
 std::vector<float> LpipsAlex::embedding_of(const RgbView& picture) const {
   if (std::min(picture.width_px, picture.height_px) < kLeastAlexNetSide_px) {
-    throw InputError(weights_->file + ": LPIPS needs pictures of at least 31x31, not " + std::to_string(picture.width_px) + "x" +
-                     std::to_string(picture.height_px));
+    throw InputError(weights_->file + ": LPIPS needs pictures of at least 31x31, not " +
+                     std::to_string(picture.width_px) + "x" + std::to_string(picture.height_px));
   }
   const torch::NoGradGuard no_gradient;
   torch::Tensor x = (to_tensor(picture) * 2 - 1 - weights_->shift) / weights_->scale;
   std::vector<torch::Tensor> activations;
   for (size_t l = 0; l < std::size(kAlexNet); ++l) {
     if (kAlexNet[l].pooled_before) x = torch::max_pool2d(x, 3, 2);
-    x = torch::relu(model::conv2d(x, weights_->weight[l], weights_->bias[l], kAlexNet[l].stride, kAlexNet[l].padding));
+    x = torch::relu(model::conv2d(x, weights_->weight[l], weights_->bias[l], kAlexNet[l].stride,
+                                  kAlexNet[l].padding));
     activations.push_back(x);
   }
   return perceptual_embedding(activations, weights_->distance);
@@ -153,19 +164,25 @@ struct InceptionFeatures::Script {
   // [F]
   torch::Tensor run(const torch::Tensor& pictures) const {
     const torch::NoGradGuard no_gradient;
-    // The optimiser specialises a graph after its first runs: the first pictures would come out in other bits than the last.
+    // The optimiser specialises a graph after its first runs: the first pictures would come out in
+    // other bits than the last.
     const torch::jit::GraphOptimizerEnabledGuard as_written(false);
     torch::jit::IValue value;
     try {
-      value = module.forward({pictures.contiguous(at::MemoryFormat::ChannelsLast)});  // toolchain/model/convolution.h
+      value = module.forward(
+          {pictures.contiguous(at::MemoryFormat::ChannelsLast)});  // toolchain/model/convolution.h
     } catch (const std::exception& error) {
       throw InputError(file + ": forward: " + reason(error));
     }
-    if (!value.isTensor()) throw InputError(file + ": forward: gives a " + value.tagKind() + ", expected a tensor [1,F] or [1,F,1,1]");
+    if (!value.isTensor())
+      throw InputError(file + ": forward: gives a " + value.tagKind() +
+                       ", expected a tensor [1,F] or [1,F,1,1]");
     const torch::Tensor features = value.toTensor();
-    const bool flat = features.dim() == 2, pooled = features.dim() == 4 && features.size(2) == 1 && features.size(3) == 1;
+    const bool flat = features.dim() == 2,
+               pooled = features.dim() == 4 && features.size(2) == 1 && features.size(3) == 1;
     if (!(flat || pooled) || features.size(0) != 1 || features.size(1) < 1) {
-      throw InputError(file + ": forward: gives the shape " + c10::str(features.sizes()) + ", expected [1,F] or [1,F,1,1]");
+      throw InputError(file + ": forward: gives the shape " + c10::str(features.sizes()) +
+                       ", expected [1,F] or [1,F,1,1]");
     }
     return features.to(torch::kFloat64).contiguous().view({-1});
   }
@@ -179,12 +196,15 @@ struct InceptionFeatures::Script {
   }
 };
 
-InceptionFeatures::InceptionFeatures(const std::string& path) : script_(std::make_unique<Script>()) {
+InceptionFeatures::InceptionFeatures(const std::string& path)
+    : script_(std::make_unique<Script>()) {
   script_->module = load_script(path);
   script_->name = "Inception (" + file_name(path) + ")";
   script_->file = path, script_->hash = hash_of_file(path);
-  if (!script_->module.find_method("forward")) throw InputError(path + ": forward: the module has no such method");
-  script_->dimension = static_cast<size_t>(script_->run(torch::zeros({1, 3, kInceptionSide_px, kInceptionSide_px})).numel());
+  if (!script_->module.find_method("forward"))
+    throw InputError(path + ": forward: the module has no such method");
+  script_->dimension = static_cast<size_t>(
+      script_->run(torch::zeros({1, 3, kInceptionSide_px, kInceptionSide_px})).numel());
 }
 
 InceptionFeatures::~InceptionFeatures() = default;
@@ -192,17 +212,22 @@ InceptionFeatures::~InceptionFeatures() = default;
 const std::string& InceptionFeatures::name() const { return script_->name; }
 
 nlohmann::json InceptionFeatures::describe() const {
-  return {{"name", script_->name}, {"file", script_->file}, {"hash", script_->hash}, {"dimension", script_->dimension}};
+  return {{"name", script_->name},
+          {"file", script_->file},
+          {"hash", script_->hash},
+          {"dimension", script_->dimension}};
 }
 
 size_t InceptionFeatures::dimension() const { return script_->dimension; }
 
 void InceptionFeatures::features_of(const RgbView& picture, std::span<double> features) const {
-  const torch::Tensor resized = at::upsample_bilinear2d(to_tensor(picture), {kInceptionSide_px, kInceptionSide_px}, false);
+  const torch::Tensor resized =
+      at::upsample_bilinear2d(to_tensor(picture), {kInceptionSide_px, kInceptionSide_px}, false);
   const torch::Tensor row = script_->run(resized * 2 - 1);
   if (static_cast<size_t>(row.numel()) != features.size())
     throw InputError(script_->file + ": forward: gives another number of features now");
-  if (!torch::isfinite(row).all().item<bool>()) throw InputError(script_->file + ": forward: gives a value that is not finite");
+  if (!torch::isfinite(row).all().item<bool>())
+    throw InputError(script_->file + ": forward: gives a value that is not finite");
   std::memcpy(features.data(), row.data_ptr<double>(), features.size_bytes());
 }
 

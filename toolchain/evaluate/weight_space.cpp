@@ -9,9 +9,12 @@ namespace figurine::evaluate {
 
 namespace {
 
-constexpr double kRounding = 1e-10;  // of the largest variance: a Gram matrix of a few hundred rows in double leaves 1e-14
+constexpr double kRounding =
+    1e-10;  // of the largest variance: a Gram matrix of a few hundred rows in double leaves 1e-14
 
-size_t vector_size(const std::vector<Token>& tokens) { return tokens.empty() ? 0 : tokens.back().begin + tokens.back().size; }
+size_t vector_size(const std::vector<Token>& tokens) {
+  return tokens.empty() ? 0 : tokens.back().begin + tokens.back().size;
+}
 
 // All members' values of a stretch agree in column d.
 bool is_shared(const RowMatrix& training, Eigen::Index d) {
@@ -31,7 +34,8 @@ std::vector<Token> weight_tokens(const Network& network, size_t shape_coefficien
     begin += size;
   };
   for (const Layer& layer : network.layers) {
-    if (layer.op == LayerOp::kConv2d) add("layer." + std::to_string(tokens.size()), layer.weights.size() + layer.bias.size());
+    if (layer.op == LayerOp::kConv2d)
+      add("layer." + std::to_string(tokens.size()), layer.weights.size() + layer.bias.size());
   }
   if (shape_coefficients > 0) add("shape", shape_coefficients);
   return tokens;
@@ -52,13 +56,16 @@ RowMatrix read_weights(const Population& population) {
   const size_t size = vector_size(weight_tokens(population.network, shape));
   RowMatrix all(static_cast<Eigen::Index>(population.size()), static_cast<Eigen::Index>(size));
   std::vector<float> storage(member_floats(population));
-  for (size_t m = 0; m < population.size(); ++m) read_weights(open_member(population, m, storage), {&all(Eigen::Index(m), 0), size});
+  for (size_t m = 0; m < population.size(); ++m)
+    read_weights(open_member(population, m, storage), {&all(Eigen::Index(m), 0), size});
   return all;
 }
 
-Avatar with_weights(const Avatar& avatar, std::span<const double> weights, std::span<float> storage) {
+Avatar with_weights(const Avatar& avatar, std::span<const double> weights,
+                    std::span<float> storage) {
   FIG_CHECK(storage.size() == weights.size(), "a float for each value");
-  std::transform(weights.begin(), weights.end(), storage.begin(), [](double value) { return static_cast<float>(value); });
+  std::transform(weights.begin(), weights.end(), storage.begin(),
+                 [](double value) { return static_cast<float>(value); });
   Avatar changed = avatar;
   size_t at = 0;
   const auto take = [&](size_t count) {
@@ -76,11 +83,15 @@ Avatar with_weights(const Avatar& avatar, std::span<const double> weights, std::
 }
 
 Standardisation::Standardisation(const RowMatrix& training, std::vector<Token> tokens)
-    : tokens_(std::move(tokens)), mean_(training.colwise().mean()), factor_(RowVector::Zero(training.cols())) {
-  FIG_CHECK(training.rows() >= 2 && size_t(training.cols()) == vector_size(tokens_), "at least two members of these tokens");
+    : tokens_(std::move(tokens)),
+      mean_(training.colwise().mean()),
+      factor_(RowVector::Zero(training.cols())) {
+  FIG_CHECK(training.rows() >= 2 && size_t(training.cols()) == vector_size(tokens_),
+            "at least two members of these tokens");
   const auto members = static_cast<double>(training.rows());
   for (const Token& token : tokens_) {
-    const auto begin = static_cast<Eigen::Index>(token.begin), end = static_cast<Eigen::Index>(token.begin + token.size);
+    const auto begin = static_cast<Eigen::Index>(token.begin),
+               end = static_cast<Eigen::Index>(token.begin + token.size);
     double squares = 0;
     size_t count = 0;
     for (Eigen::Index d = begin; d < end; ++d) {
@@ -92,7 +103,8 @@ Standardisation::Standardisation(const RowMatrix& training, std::vector<Token> t
       factor_[d] = 1;
       ++count;
     }
-    const double scale = count == 0 ? 0 : std::sqrt(squares / (members * static_cast<double>(count)));
+    const double scale =
+        count == 0 ? 0 : std::sqrt(squares / (members * static_cast<double>(count)));
     if (count > 0) factor_.segment(begin, end - begin) /= scale;
     scale_.push_back(scale);
     varying_.push_back(count);
@@ -120,12 +132,15 @@ RowVector Standardisation::restore(const RowVector& z) const {
   return weights;
 }
 
-PrincipalBasis::PrincipalBasis(const RowMatrix& training, size_t begin, size_t size) : training_(&training), begin_(begin), size_(size) {
-  const auto block = training.middleCols(static_cast<Eigen::Index>(begin), static_cast<Eigen::Index>(size));
+PrincipalBasis::PrincipalBasis(const RowMatrix& training, size_t begin, size_t size)
+    : training_(&training), begin_(begin), size_(size) {
+  const auto block =
+      training.middleCols(static_cast<Eigen::Index>(begin), static_cast<Eigen::Index>(size));
   const Eigen::Index members = training.rows();
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(members, members);
   gram.selfadjointView<Eigen::Lower>().rankUpdate(block);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram);  // ascending; reads the lower triangle
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
+      gram);  // ascending; reads the lower triangle
   const Eigen::VectorXd& values = solver.eigenvalues();
   Eigen::Index rank = 0;
   while (rank < members - 1 && values[members - 1 - rank] > kRounding * values[members - 1]) ++rank;
@@ -139,25 +154,30 @@ PrincipalBasis::PrincipalBasis(const RowMatrix& training, size_t begin, size_t s
 }
 
 RowMatrix PrincipalBasis::directions(size_t rank) const {
-  const auto block = training_->middleCols(static_cast<Eigen::Index>(begin_), static_cast<Eigen::Index>(size_));
-  return mixture_.leftCols(static_cast<Eigen::Index>(std::min(rank, this->rank()))).transpose() * block;
+  const auto block =
+      training_->middleCols(static_cast<Eigen::Index>(begin_), static_cast<Eigen::Index>(size_));
+  return mixture_.leftCols(static_cast<Eigen::Index>(std::min(rank, this->rank()))).transpose() *
+         block;
 }
 
 Eigen::VectorXd PrincipalBasis::coordinates(const RowVector& z) const {
   const auto begin = static_cast<Eigen::Index>(begin_), size = static_cast<Eigen::Index>(size_);
-  const Eigen::VectorXd against_members = training_->middleCols(begin, size) * z.segment(begin, size).transpose();
+  const Eigen::VectorXd against_members =
+      training_->middleCols(begin, size) * z.segment(begin, size).transpose();
   return mixture_.transpose() * against_members;
 }
 
 RowVector PrincipalBasis::combine(const Eigen::VectorXd& coordinates, size_t rank) const {
-  const auto block = training_->middleCols(static_cast<Eigen::Index>(begin_), static_cast<Eigen::Index>(size_));
+  const auto block =
+      training_->middleCols(static_cast<Eigen::Index>(begin_), static_cast<Eigen::Index>(size_));
   const auto used = static_cast<Eigen::Index>(std::min(rank, this->rank()));
   const Eigen::VectorXd of_members = mixture_.leftCols(used) * coordinates.head(used);
   return of_members.transpose() * block;
 }
 
 size_t directions_for(const Eigen::VectorXd& variance, double share) {
-  const double wanted = share * variance.sum() * (1 - 1e-12);  // a share of exactly all must not fail by a rounding
+  const double wanted =
+      share * variance.sum() * (1 - 1e-12);  // a share of exactly all must not fail by a rounding
   double sum = 0;
   for (Eigen::Index k = 0; k < variance.size(); ++k) {
     sum += variance[k];
@@ -172,11 +192,14 @@ double participation_ratio(const Eigen::VectorXd& variance) {
 }
 
 RowMatrix rms_distances(const RowMatrix& a, const RowMatrix& b, size_t varying) {
-  // |x - y|^2 = |x|^2 + |y|^2 - 2 x.y, which cancels: distances below 1e-7 of the vectors' length are rounding.
+  // |x - y|^2 = |x|^2 + |y|^2 - 2 x.y, which cancels: distances below 1e-7 of the vectors' length
+  // are rounding.
   RowMatrix squares = -2 * (a * b.transpose());
   squares.colwise() += a.rowwise().squaredNorm();
   squares.rowwise() += b.rowwise().squaredNorm().transpose();
-  return (squares.array().max(0) / static_cast<double>(std::max<size_t>(varying, 1))).sqrt().matrix();
+  return (squares.array().max(0) / static_cast<double>(std::max<size_t>(varying, 1)))
+      .sqrt()
+      .matrix();
 }
 
 }  // namespace figurine::evaluate

@@ -25,14 +25,16 @@ int64_t side_of(size_t width) {
   return (side + kReduction - 1) / kReduction * kReduction;
 }
 
-void add_convolution(FlatLayout& layout, const std::string& name, std::vector<int64_t> shape, int64_t out) {
+void add_convolution(FlatLayout& layout, const std::string& name, std::vector<int64_t> shape,
+                     int64_t out) {
   layout.add(name + ".weight", std::move(shape));
   layout.add(name + ".bias", {out});
 }
 
 void add_residual_block(FlatLayout& layout, const std::string& name, int64_t width) {
   for (const char* part : {".0", ".1"}) {
-    layout.add(name + part + ".norm.weight", {width}), layout.add(name + part + ".norm.bias", {width});
+    layout.add(name + part + ".norm.weight", {width}),
+        layout.add(name + part + ".norm.bias", {width});
     add_convolution(layout, name + part, {width, width, 3, 3}, width);
   }
 }
@@ -41,7 +43,8 @@ FlatLayout layout_of(int64_t channels) {
   FlatLayout layout;
   int64_t in = 1;
   for (size_t i = 0; i < std::size(kWidths); ++i) {
-    add_convolution(layout, "encoder.down." + std::to_string(i), {kWidths[i], in, 3, 3}, kWidths[i]);
+    add_convolution(layout, "encoder.down." + std::to_string(i), {kWidths[i], in, 3, 3},
+                    kWidths[i]);
     in = kWidths[i];
   }
   add_residual_block(layout, "encoder.block", in);
@@ -90,9 +93,15 @@ size_t first_of_decoder(const FlatLayout& layout) {
 }  // namespace
 
 Autoencoder::Autoencoder(size_t width, const AutoencoderSettings& settings, uint64_t seed)
-    : width_(static_cast<int64_t>(width)), channels_(settings.channels), side_(side_of(width)), parameters_(layout_of(settings.channels)) {
-  if (channels_ < 1) throw InputError("sampler: autoencoder: channels: " + std::to_string(channels_) + " is not positive");
-  token_sizes_.assign(static_cast<size_t>(latent_side()), static_cast<size_t>(channels_ * latent_side()));
+    : width_(static_cast<int64_t>(width)),
+      channels_(settings.channels),
+      side_(side_of(width)),
+      parameters_(layout_of(settings.channels)) {
+  if (channels_ < 1)
+    throw InputError("sampler: autoencoder: channels: " + std::to_string(channels_) +
+                     " is not positive");
+  token_sizes_.assign(static_cast<size_t>(latent_side()),
+                      static_cast<size_t>(channels_ * latent_side()));
   const torch::NoGradGuard no_gradient;
   auto generator = at::make_generator<at::CPUGeneratorImpl>(seed);
   double bound = 0;  // of the weight before: its bias has the same
@@ -106,7 +115,8 @@ Autoencoder::Autoencoder(size_t width, const AutoencoderSettings& settings, uint
     // Every output of a transposed convolution of stride 2 sees a quarter of its 4x4 taps.
     const bool up = list[i].name.starts_with("decoder.up");
     if (list[i].name.ends_with("weight")) {
-      const auto inputs = static_cast<double>(up ? list[i].shape[0] * 4 : list[i].shape[1] * list[i].shape[2] * list[i].shape[3]);
+      const auto inputs = static_cast<double>(
+          up ? list[i].shape[0] * 4 : list[i].shape[1] * list[i].shape[2] * list[i].shape[3]);
       bound = 1 / std::sqrt(inputs);
     }
     values.uniform_(-bound, bound, generator);
@@ -115,7 +125,8 @@ Autoencoder::Autoencoder(size_t width, const AutoencoderSettings& settings, uint
 
 Autoencoder::Posterior Autoencoder::posterior(const torch::Tensor& z) const {
   Reader reader{parameters_, 0};
-  torch::Tensor x = torch::constant_pad_nd(z, {0, side_ * side_ - width_}).view({z.size(0), 1, side_, side_});
+  torch::Tensor x =
+      torch::constant_pad_nd(z, {0, side_ * side_ - width_}).view({z.size(0), 1, side_, side_});
   for (size_t i = 0; i < std::size(kWidths); ++i) x = torch::silu(reader.convolution(x, 2));
   x = reader.residual_block(x);
   const std::vector<torch::Tensor> halves = reader.convolution(x, 1).chunk(2, 1);
@@ -136,7 +147,8 @@ RowMatrix Autoencoder::encode(const RowMatrix& z) const {
   for (Eigen::Index first = 0; first < z.rows(); first += kRowsAtOnce) {
     const Eigen::Index count = std::min(kRowsAtOnce, z.rows() - first);
     // [B,C,S,S] to rows of the map, all channels of a row together: a token.
-    const torch::Tensor map = posterior(to_tensor(z.middleRows(first, count))).mean.permute({0, 2, 1, 3});
+    const torch::Tensor map =
+        posterior(to_tensor(z.middleRows(first, count))).mean.permute({0, 2, 1, 3});
     out.middleRows(first, count) = to_rows(map.reshape({count, channels_ * s * s}));
   }
   return out;
@@ -148,13 +160,16 @@ RowMatrix Autoencoder::decode(const RowMatrix& latents) const {
   RowMatrix out(latents.rows(), width_);
   for (Eigen::Index first = 0; first < latents.rows(); first += kRowsAtOnce) {
     const Eigen::Index count = std::min(kRowsAtOnce, latents.rows() - first);
-    const torch::Tensor map = to_tensor(latents.middleRows(first, count)).view({count, s, channels_, s}).permute({0, 2, 1, 3});
+    const torch::Tensor map = to_tensor(latents.middleRows(first, count))
+                                  .view({count, s, channels_, s})
+                                  .permute({0, 2, 1, 3});
     out.middleRows(first, count) = to_rows(reconstruct(map.contiguous()));
   }
   return out;
 }
 
-Autoencoding::Autoencoding(std::shared_ptr<Autoencoder> autoencoder, const SamplerSettings& settings, const RowMatrix& training,
+Autoencoding::Autoencoding(std::shared_ptr<Autoencoder> autoencoder,
+                           const SamplerSettings& settings, const RowMatrix& training,
                            const RowMatrix& validation)
     : autoencoder_(std::move(autoencoder)),
       settings_(settings),
@@ -168,18 +183,25 @@ torch::Tensor Autoencoding::loss(uint64_t iteration, Share share) {
   for (int64_t row = 0; row < share.count; ++row) {
     const uint64_t counter = iteration * settings_.batch + static_cast<uint64_t>(share.first + row);
     z.push_back(training_[static_cast<int64_t>(order_.item(counter))]);
-    noise.push_back(draw_noise(settings_.seed, kPosteriorNoise, counter, autoencoder_->channels() * s * s));
+    noise.push_back(
+        draw_noise(settings_.seed, kPosteriorNoise, counter, autoencoder_->channels() * s * s));
   }
   const torch::Tensor clean = torch::stack(z);
   const Autoencoder::Posterior posterior = autoencoder_->posterior(clean);
-  const torch::Tensor map = posterior.mean + torch::exp(0.5 * posterior.log_variance) * torch::stack(noise).view_as(posterior.mean);
-  const torch::Tensor kl = 0.5 * (posterior.mean.square() + posterior.log_variance.exp() - 1 - posterior.log_variance).mean();
-  return torch::mse_loss(autoencoder_->reconstruct(map), clean) + settings_.autoencoder.kl_weight * kl;
+  const torch::Tensor map = posterior.mean + torch::exp(0.5 * posterior.log_variance) *
+                                                 torch::stack(noise).view_as(posterior.mean);
+  const torch::Tensor kl =
+      0.5 *
+      (posterior.mean.square() + posterior.log_variance.exp() - 1 - posterior.log_variance).mean();
+  return torch::mse_loss(autoencoder_->reconstruct(map), clean) +
+         settings_.autoencoder.kl_weight * kl;
 }
 
 double Autoencoding::validation_loss() {
   if (validation_.size(0) == 0) return std::numeric_limits<double>::quiet_NaN();
-  return torch::mse_loss(autoencoder_->reconstruct(autoencoder_->posterior(validation_).mean), validation_).item<double>();
+  return torch::mse_loss(autoencoder_->reconstruct(autoencoder_->posterior(validation_).mean),
+                         validation_)
+      .item<double>();
 }
 
 }  // namespace figurine::generate

@@ -1,14 +1,18 @@
-// The variational autoencoder of variant `latent`: a member's standardised weights, zero-padded and folded into a square picture of one
-// channel, to a map of an eighth of its side with a few channels, and back.
+// The variational autoencoder of variant `latent`: a member's standardised weights, zero-padded and
+// folded into a square picture of one channel, to a map of an eighth of its side with a few
+// channels, and back.
 //
-//   encoder  3 convolutions 3x3 of stride 2 (16, 32, 64 channels), a residual block, a convolution to mean and log-variance
-//   decoder  a convolution, a residual block, 3 transposed convolutions 4x4 of stride 2 (32, 16, 1 channels)
-//   loss     mean square error of the values + kl_weight x mean over the latent values of KL(N(mean, variance) | N(0, 1))
+//   encoder  3 convolutions 3x3 of stride 2 (16, 32, 64 channels), a residual block, a convolution
+//   to mean and log-variance decoder  a convolution, a residual block, 3 transposed convolutions
+//   4x4 of stride 2 (32, 16, 1 channels) loss     mean square error of the values + kl_weight x
+//   mean over the latent values of KL(N(mean, variance) | N(0, 1))
 //
-// Neighbours in such a picture are neighbours in memory and nothing else, which is what the paper holds against it.
+// Neighbours in such a picture are neighbours in memory and nothing else, which is what the paper
+// holds against it.
 //
-// Based on: the paper, section 5.3 (after Soro et al., Diffusion-based neural network weights generation, 2025); Rombach et al., Latent
-// diffusion, 2022; Kingma and Welling, Auto-encoding variational Bayes, 2014.
+// Based on: the paper, section 5.3 (after Soro et al., Diffusion-based neural network weights
+// generation, 2025); Rombach et al., Latent diffusion, 2022; Kingma and Welling, Auto-encoding
+// variational Bayes, 2014.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +30,8 @@ namespace figurine::generate {
 
 class Autoencoder : public WeightCodec {
  public:
-  // width: values of a member, W. Random weights from the seed. Throws InputError if channels are none.
+  // width: values of a member, W. Random weights from the seed. Throws InputError if channels are
+  // none.
   Autoencoder(size_t width, const AutoencoderSettings& settings, uint64_t seed);
 
   struct Posterior {
@@ -37,7 +42,9 @@ class Autoencoder : public WeightCodec {
 
   evaluate::RowMatrix encode(const evaluate::RowMatrix& z) const override;  // means
   evaluate::RowMatrix decode(const evaluate::RowMatrix& latents) const override;
-  const std::vector<size_t>& token_sizes() const override { return token_sizes_; }  // S rows of the map
+  const std::vector<size_t>& token_sizes() const override {
+    return token_sizes_;
+  }  // S rows of the map
 
   FlatParameters& parameters() { return parameters_; }
   int64_t latent_side() const { return side_ / 8; }  // S
@@ -49,12 +56,12 @@ class Autoencoder : public WeightCodec {
   mutable FlatParameters parameters_;
 };
 
-// Its batches and loss. z: standardised weights [N,W] of the members to learn from and of those to validate on; the validation loss is
-// the mean square error of what is decoded from their means.
+// Its batches and loss. z: standardised weights [N,W] of the members to learn from and of those to
+// validate on; the validation loss is the mean square error of what is decoded from their means.
 class Autoencoding : public FlatModel {
  public:
-  Autoencoding(std::shared_ptr<Autoencoder> autoencoder, const SamplerSettings& settings, const evaluate::RowMatrix& training,
-               const evaluate::RowMatrix& validation);
+  Autoencoding(std::shared_ptr<Autoencoder> autoencoder, const SamplerSettings& settings,
+               const evaluate::RowMatrix& training, const evaluate::RowMatrix& validation);
 
   torch::Tensor& weights() override { return autoencoder_->parameters().weights(); }
   torch::Tensor& gradients() override { return autoencoder_->parameters().gradients(); }

@@ -9,7 +9,9 @@
 
 namespace figurine::generate {
 
-int64_t FlatParameter::count() const { return std::accumulate(shape.begin(), shape.end(), int64_t{1}, std::multiplies<>()); }
+int64_t FlatParameter::count() const {
+  return std::accumulate(shape.begin(), shape.end(), int64_t{1}, std::multiplies<>());
+}
 
 void FlatLayout::add(const std::string& name, std::vector<int64_t> shape) {
   list_.push_back({name, std::move(shape), count_});
@@ -17,16 +19,21 @@ void FlatLayout::add(const std::string& name, std::vector<int64_t> shape) {
 }
 
 FlatParameters::FlatParameters(FlatLayout layout)
-    : layout_(std::move(layout)), weights_(torch::zeros({layout_.count()})), gradients_(torch::zeros({layout_.count()})) {
+    : layout_(std::move(layout)),
+      weights_(torch::zeros({layout_.count()})),
+      gradients_(torch::zeros({layout_.count()})) {
   for (const FlatParameter& parameter : layout_.list()) {
-    const auto view = [&](const torch::Tensor& flat) { return flat.narrow(0, parameter.begin, parameter.count()).view(parameter.shape); };
+    const auto view = [&](const torch::Tensor& flat) {
+      return flat.narrow(0, parameter.begin, parameter.count()).view(parameter.shape);
+    };
     torch::Tensor leaf = view(weights_).detach().requires_grad_();
     leaf.mutable_grad() = view(gradients_);
     leaves_.push_back(leaf);
   }
 }
 
-void save_parameters(const std::string& path, const FlatLayout& layout, const torch::Tensor& values) {
+void save_parameters(const std::string& path, const FlatLayout& layout,
+                     const torch::Tensor& values) {
   train::TensorFile file;
   const float* data = values.data_ptr<float>();
   for (const FlatParameter& parameter : layout.list()) {
@@ -42,8 +49,10 @@ void load_parameters(const std::string& path, const FlatLayout& layout, torch::T
   for (const FlatParameter& parameter : layout.list()) {
     const auto found = file.tensors.find(parameter.name);
     if (found == file.tensors.end()) throw InputError(path + ": " + parameter.name + ": missing");
-    if (found->second.shape != parameter.shape) throw InputError(path + ": " + parameter.name + ": is of another shape");
-    std::memcpy(data + parameter.begin, found->second.values.data(), found->second.values.size() * sizeof(float));
+    if (found->second.shape != parameter.shape)
+      throw InputError(path + ": " + parameter.name + ": is of another shape");
+    std::memcpy(data + parameter.begin, found->second.values.data(),
+                found->second.values.size() * sizeof(float));
   }
 }
 

@@ -1,5 +1,6 @@
-// The parameters of a network as one flat tensor, so that the optimiser, the moving average, checkpoints and an all-reduce are each one
-// operation; beside it the gradients, and a leaf of each parameter's shape that is a view of both.
+// The parameters of a network as one flat tensor, so that the optimiser, the moving average,
+// checkpoints and an all-reduce are each one operation; beside it the gradients, and a leaf of each
+// parameter's shape that is a view of both.
 #pragma once
 
 #include <torch/torch.h>
@@ -47,8 +48,10 @@ class FlatParameters {
   std::vector<torch::Tensor> leaves_;
 };
 
-// A safetensors file with one tensor a parameter. values: [P]. Throws InputError, for reading naming the parameter that does not fit.
-void save_parameters(const std::string& path, const FlatLayout& layout, const torch::Tensor& values);
+// A safetensors file with one tensor a parameter. values: [P]. Throws InputError, for reading
+// naming the parameter that does not fit.
+void save_parameters(const std::string& path, const FlatLayout& layout,
+                     const torch::Tensor& values);
 void load_parameters(const std::string& path, const FlatLayout& layout, torch::Tensor& values);
 
 }  // namespace figurine::generate

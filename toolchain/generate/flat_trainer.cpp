@@ -18,9 +18,12 @@ namespace {
 constexpr uint64_t kLogPeriod = 50;
 constexpr uint64_t kValidationPeriod = 500;  // iterations; a multiple of the log's
 constexpr double kRunningMean = 0.02;
-constexpr double kCheckpointShare = 0.05;  // of the time: `layer` at edge saves 1.4 GB, which takes some disks longer than the period
+constexpr double kCheckpointShare = 0.05;  // of the time: `layer` at edge saves 1.4 GB, which takes
+                                           // some disks longer than the period
 
-double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace
 
@@ -31,13 +34,15 @@ Share share_of(int64_t batch, int rank, int ranks) {
 
 void check_batch(uint32_t batch, const ProcessGroup& group, const std::string& run) {
   if (static_cast<int64_t>(batch) >= group.size()) return;
-  throw InputError(run + ": a batch of " + std::to_string(batch) + " is too small for " + std::to_string(group.size()) + " ranks");
+  throw InputError(run + ": a batch of " + std::to_string(batch) + " is too small for " +
+                   std::to_string(group.size()) + " ranks");
 }
 
 nlohmann::json log_to_json(const std::vector<FlatLogRow>& log) {
   nlohmann::json json = nlohmann::json::array();
   for (const FlatLogRow& row : log) {
-    const nlohmann::json validation = std::isfinite(row.validation_loss) ? nlohmann::json(row.validation_loss) : nlohmann::json();
+    const nlohmann::json validation =
+        std::isfinite(row.validation_loss) ? nlohmann::json(row.validation_loss) : nlohmann::json();
     json.push_back({row.iteration, row.seconds, row.learning_rate, row.loss, validation});
   }
   return json;
@@ -47,8 +52,10 @@ std::vector<FlatLogRow> log_from_json(const nlohmann::json& json, uint64_t last_
   std::vector<FlatLogRow> log;
   for (const nlohmann::json& row : json) {
     if (row.at(0).get<uint64_t>() > last_iteration) break;
-    log.push_back({row.at(0).get<uint64_t>(), row.at(1).get<double>(), row.at(2).get<double>(), row.at(3).get<double>(),
-                   row.at(4).is_null() ? std::numeric_limits<double>::quiet_NaN() : row.at(4).get<double>()});
+    log.push_back(
+        {row.at(0).get<uint64_t>(), row.at(1).get<double>(), row.at(2).get<double>(),
+         row.at(3).get<double>(),
+         row.at(4).is_null() ? std::numeric_limits<double>::quiet_NaN() : row.at(4).get<double>()});
   }
   return log;
 }
@@ -57,10 +64,12 @@ void save_log(const std::string& path, const std::vector<FlatLogRow>& log) {
   std::string text = "iteration,seconds,learning_rate,loss,validation_loss\n";
   for (const FlatLogRow& row : log) {
     char line[160];
-    std::snprintf(line, sizeof(line), "%llu,%.3f,%.6g,%.6f,", static_cast<unsigned long long>(row.iteration), row.seconds,
-                  row.learning_rate, row.loss);
+    std::snprintf(line, sizeof(line), "%llu,%.3f,%.6g,%.6f,",
+                  static_cast<unsigned long long>(row.iteration), row.seconds, row.learning_rate,
+                  row.loss);
     text += line;
-    if (std::isfinite(row.validation_loss)) std::snprintf(line, sizeof(line), "%.6f", row.validation_loss), text += line;
+    if (std::isfinite(row.validation_loss))
+      std::snprintf(line, sizeof(line), "%.6f", row.validation_loss), text += line;
     text += "\n";
   }
   throw_if_error(ports::write_file_atomically(path, std::as_bytes(std::span(text))), "cannot save");
@@ -74,7 +83,10 @@ FlatTrainer::FlatTrainer(FlatModel& model, ProcessGroup& group, FlatTraining opt
       share_(share_of(options_.batch, group.rank(), group.size())),
       average_(model.weights().clone()),
       optimiser_(model::adamw_group(static_cast<uint64_t>(model.weights().numel())),
-                 {.beta1 = options_.beta1, .beta2 = options_.beta2, .epsilon = 1e-8, .weight_decay = options_.weight_decay}) {
+                 {.beta1 = options_.beta1,
+                  .beta2 = options_.beta2,
+                  .epsilon = 1e-8,
+                  .weight_decay = options_.weight_decay}) {
   check_batch(options_.batch, group, options_.run);
 }
 
@@ -94,12 +106,15 @@ void FlatTrainer::resume(const nlohmann::json& log) {
 
 // All ranks begin where rank 0 is.
 void FlatTrainer::share_state() {
-  for (torch::Tensor* tensor : {&model_.weights(), &average_, &optimiser_.first_moment, &optimiser_.second_moment})
+  for (torch::Tensor* tensor :
+       {&model_.weights(), &average_, &optimiser_.first_moment, &optimiser_.second_moment})
     group_.broadcast(*tensor);
-  torch::Tensor numbers =
-      torch::tensor({static_cast<double>(progress_.iteration), progress_.seconds, static_cast<double>(optimiser_.steps)}, torch::kFloat64);
+  torch::Tensor numbers = torch::tensor({static_cast<double>(progress_.iteration),
+                                         progress_.seconds, static_cast<double>(optimiser_.steps)},
+                                        torch::kFloat64);
   group_.broadcast(numbers);
-  progress_.iteration = static_cast<uint64_t>(numbers[0].item<double>()), progress_.seconds = numbers[1].item<double>();
+  progress_.iteration = static_cast<uint64_t>(numbers[0].item<double>()),
+  progress_.seconds = numbers[1].item<double>();
   optimiser_.steps = static_cast<int64_t>(numbers[2].item<double>());
 }
 
@@ -110,7 +125,8 @@ FlatProgress FlatTrainer::run() {
   } catch (const PeerLost& lost) {
     if (!group_.leads()) throw;
     save("interrupted");
-    throw PeerLost(std::string(lost.what()) + "; saved after " + std::to_string(progress_.iteration) +
+    throw PeerLost(std::string(lost.what()) + "; saved after " +
+                   std::to_string(progress_.iteration) +
                    " iterations, --resume goes on from there");
   }
   if (group_.leads()) progress_.validation_loss = validate();
@@ -133,24 +149,28 @@ void FlatTrainer::train_to_the_end() {
     if (stop || (options_.stop_after > 0 && iteration >= options_.stop_after)) {
       save("interrupted");
       group_.barrier();  // a rank that leaves may end the others: not before rank 0 has saved
-      throw train::Interrupted(options_.run + ": stopped after " + std::to_string(iteration) + " iterations; --resume goes on from here");
+      throw train::Interrupted(options_.run + ": stopped after " + std::to_string(iteration) +
+                               " iterations; --resume goes on from here");
     }
-    const double rate = train::learning_rate(options_.schedule, iteration, seconds), before = now_s();
+    const double rate = train::learning_rate(options_.schedule, iteration, seconds),
+                 before = now_s();
     double loss = iterate(rate);
     seconds += now_s() - before;
     ++iteration;
     stop = agree(loss, interrupt.requested());
     record(loss, rate);
     done = train::progress(budget, iteration, seconds);
-    const double speed = static_cast<double>(iteration - session_first) / std::max(1e-9, seconds - session_start);
+    const double speed =
+        static_cast<double>(iteration - session_first) / std::max(1e-9, seconds - session_start);
     char line[160];
-    std::snprintf(line, sizeof(line), "iteration %llu, loss %.5f, %.2f it/s", static_cast<unsigned long long>(iteration), progress_.loss,
-                  speed);
+    std::snprintf(line, sizeof(line), "iteration %llu, loss %.5f, %.2f it/s",
+                  static_cast<unsigned long long>(iteration), progress_.loss, speed);
     bar.show(done, line);
     if (now_s() > next_checkpoint && done < 1) {
       const double start = now_s();
       save("running");
-      next_checkpoint = now_s() + std::max(options_.checkpoint_period_s, (now_s() - start) / kCheckpointShare);
+      next_checkpoint =
+          now_s() + std::max(options_.checkpoint_period_s, (now_s() - start) / kCheckpointShare);
     }
   }
 }
@@ -159,30 +179,36 @@ void FlatTrainer::train_to_the_end() {
 double FlatTrainer::iterate(double rate) {
   model_.gradients().zero_();
   torch::Tensor loss = model_.loss(progress_.iteration, share_);
-  if (share_.count < static_cast<int64_t>(options_.batch)) loss = loss * (static_cast<double>(share_.count) / options_.batch);
+  if (share_.count < static_cast<int64_t>(options_.batch))
+    loss = loss * (static_cast<double>(share_.count) / options_.batch);
   const double value = loss.item<double>();
   if (group_.size() == 1 && !std::isfinite(value)) fail("the loss is not finite");
   loss.backward();
   group_.sum(model_.gradients());
   // Of many ranks all see the same sum here, so that all of them fail.
-  if (!optimiser_.step(model_.weights(), model_.gradients(), rate)) fail("a gradient is not finite");
+  if (!optimiser_.step(model_.weights(), model_.gradients(), rate))
+    fail("a gradient is not finite");
   // The average of a young run forgets faster, or it would remember the random start.
-  const double age = static_cast<double>(progress_.iteration + 1), decay = std::min(options_.ema, age / (age + 9));
+  const double age = static_cast<double>(progress_.iteration + 1),
+               decay = std::min(options_.ema, age / (age + 9));
   average_.lerp_(model_.weights(), 1 - decay);
   return value;
 }
 
-// What all ranks go on with: the batch's loss, rank 0's seconds, and whether any of them was asked to stop.
+// What all ranks go on with: the batch's loss, rank 0's seconds, and whether any of them was asked
+// to stop.
 bool FlatTrainer::agree(double& loss, bool stop) {
   if (group_.size() == 1) return stop;
-  torch::Tensor numbers = torch::tensor({loss, stop ? 1.0 : 0.0, group_.leads() ? progress_.seconds : 0.0}, torch::kFloat64);
+  torch::Tensor numbers = torch::tensor(
+      {loss, stop ? 1.0 : 0.0, group_.leads() ? progress_.seconds : 0.0}, torch::kFloat64);
   group_.sum(numbers);
   loss = numbers[0].item<double>(), progress_.seconds = numbers[2].item<double>();
   return numbers[1].item<double>() > 0;
 }
 
 void FlatTrainer::fail(const std::string& what) const {
-  throw InputError(options_.run + ": iteration " + std::to_string(progress_.iteration) + ": " + what + "; the last checkpoint is kept");
+  throw InputError(options_.run + ": iteration " + std::to_string(progress_.iteration) + ": " +
+                   what + "; the last checkpoint is kept");
 }
 
 // Loss of the moving average on the validation members.
@@ -201,9 +227,12 @@ void FlatTrainer::record(double loss, double rate) {
   progress_.loss += weight * (loss - progress_.loss);
   if (progress_.iteration % kLogPeriod != 0) return;
   group_.expect_same(model_.weights(), "the weights");
-  FlatLogRow row{
-      .iteration = progress_.iteration, .seconds = progress_.seconds, .learning_rate = rate, .loss = sum_ / static_cast<double>(count_)};
-  if (group_.leads() && progress_.iteration % kValidationPeriod == 0) row.validation_loss = progress_.validation_loss = validate();
+  FlatLogRow row{.iteration = progress_.iteration,
+                 .seconds = progress_.seconds,
+                 .learning_rate = rate,
+                 .loss = sum_ / static_cast<double>(count_)};
+  if (group_.leads() && progress_.iteration % kValidationPeriod == 0)
+    row.validation_loss = progress_.validation_loss = validate();
   progress_.log.push_back(row);
   sum_ = 0, count_ = 0;
 }

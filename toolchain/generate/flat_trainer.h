@@ -1,9 +1,12 @@
-// The training of one network whose parameters are one flat tensor: AdamW under a schedule, a moving average of the weights, a log,
-// checkpoints from which a run goes on with the same bits, Ctrl-C, and ranks that share every batch.
+// The training of one network whose parameters are one flat tensor: AdamW under a schedule, a
+// moving average of the weights, a log, checkpoints from which a run goes on with the same bits,
+// Ctrl-C, and ranks that share every batch.
 //
-// With R ranks, rank r computes places [r B / R, (r + 1) B / R) of every batch of B; its mean loss is weighted by its share of the batch,
-// so that the sum over the ranks is the mean over the batch. One all-reduce adds the flat gradients, a second one of three numbers the
-// loss, the wish to stop and rank 0's seconds, by which all decide alike. Rank 0 alone validates, writes and shows progress.
+// With R ranks, rank r computes places [r B / R, (r + 1) B / R) of every batch of B; its mean loss
+// is weighted by its share of the batch, so that the sum over the ranks is the mean over the batch.
+// One all-reduce adds the flat gradients, a second one of three numbers the loss, the wish to stop
+// and rank 0's seconds, by which all decide alike. Rank 0 alone validates, writes and shows
+// progress.
 #pragma once
 
 #include <torch/torch.h>
@@ -33,10 +36,12 @@ void check_batch(uint32_t batch, const ProcessGroup& group, const std::string& r
 class FlatModel {
  public:
   virtual ~FlatModel() = default;
-  virtual torch::Tensor& weights() = 0;                             // [P] flat; assigned to in place only
-  virtual torch::Tensor& gradients() = 0;                           // [P] flat; backward passes add to it
-  virtual torch::Tensor loss(uint64_t iteration, Share share) = 0;  // mean over the share, differentiable
-  virtual double validation_loss() = 0;                             // of the weights as they are; NaN if there is nothing to validate on
+  virtual torch::Tensor& weights() = 0;    // [P] flat; assigned to in place only
+  virtual torch::Tensor& gradients() = 0;  // [P] flat; backward passes add to it
+  virtual torch::Tensor loss(uint64_t iteration,
+                             Share share) = 0;  // mean over the share, differentiable
+  virtual double
+  validation_loss() = 0;  // of the weights as they are; NaN if there is nothing to validate on
 };
 
 struct FlatTraining {
@@ -54,7 +59,8 @@ struct FlatTraining {
 
 struct FlatLogRow {
   uint64_t iteration = 0;
-  double seconds = 0, learning_rate = 0, loss = 0, validation_loss = std::numeric_limits<double>::quiet_NaN();
+  double seconds = 0, learning_rate = 0, loss = 0,
+         validation_loss = std::numeric_limits<double>::quiet_NaN();
 };
 
 // How far a training is.
@@ -79,7 +85,8 @@ class FlatTrainer {
   // model and group are borrowed.
   FlatTrainer(FlatModel& model, ProcessGroup& group, FlatTraining options, Saved saved);
 
-  // Goes on from the checkpoint, if rank 0 has one. log: of the run so far. Throws InputError naming what does not fit.
+  // Goes on from the checkpoint, if rank 0 has one. log: of the run so far. Throws InputError
+  // naming what does not fit.
   void resume(const nlohmann::json& log);
   // Throws InputError, PeerLost (rank 0 has saved) or train::Interrupted (rank 0 has saved).
   FlatProgress run();

@@ -1,15 +1,20 @@
-// What a denoiser of weights works on: members of a population as vectors of unit scale, cut into the tokens of one of the paper's
-// variants or of ours. Linear algebra alone, in double, found from the training part alone; no LibTorch.
+// What a denoiser of weights works on: members of a population as vectors of unit scale, cut into
+// the tokens of one of the paper's variants or of ours. Linear algebra alone, in double, found from
+// the training part alone; no LibTorch.
 //
-// Letters: M rows of any members, N training members, W values of a member (weights, biases, shape), D values of a model vector, L tokens.
+// Letters: M rows of any members, N training members, W values of a member (weights, biases,
+// shape), D values of a model vector, L tokens.
 //
-//   layer   one token a convolution and one for the shape: the standardised weights themselves (the paper)
-//   flat    the same values as one vector, zero-padded and cut into equal chunks (the paper's ablation, after Peebles et al. 2022)
-//   latent  what an autoencoder makes of the values, of one scale (the paper's ablation; autoencoder.h)
-//   basis   one token a convolution and one for the shape: coordinates in that token's principal directions, at most `rank` of them (ours;
-//           the paper's future work). Members that lie outside the training members' span cannot be reached.
+//   layer   one token a convolution and one for the shape: the standardised weights themselves (the
+//   paper) flat    the same values as one vector, zero-padded and cut into equal chunks (the
+//   paper's ablation, after Peebles et al. 2022) latent  what an autoencoder makes of the values,
+//   of one scale (the paper's ablation; autoencoder.h) basis   one token a convolution and one for
+//   the shape: coordinates in that token's principal directions, at most `rank` of them (ours;
+//           the paper's future work). Members that lie outside the training members' span cannot be
+//           reached.
 //
-// Based on: the paper, section 4.2 and its ablation; Erkoc et al., HyperDiffusion, 2023 (standardised weights, one token a layer).
+// Based on: the paper, section 4.2 and its ablation; Erkoc et al., HyperDiffusion, 2023
+// (standardised weights, one token a layer).
 #pragma once
 
 #include <cstddef>
@@ -36,31 +41,35 @@ struct ModelSpaceOptions {
 class WeightCodec {
  public:
   virtual ~WeightCodec() = default;
-  virtual evaluate::RowMatrix encode(const evaluate::RowMatrix& z) const = 0;        // [M,W] to [M,D]
-  virtual evaluate::RowMatrix decode(const evaluate::RowMatrix& latents) const = 0;  // [M,D] to [M,W]
-  virtual const std::vector<size_t>& token_sizes() const = 0;                        // [L]
+  virtual evaluate::RowMatrix encode(const evaluate::RowMatrix& z) const = 0;  // [M,W] to [M,D]
+  virtual evaluate::RowMatrix decode(
+      const evaluate::RowMatrix& latents) const = 0;           // [M,D] to [M,W]
+  virtual const std::vector<size_t>& token_sizes() const = 0;  // [L]
 };
 
 class ModelSpace {
  public:
   // training: [N,W] as read_weights gives them, N >= 2. codec: of `latent`, and of it alone.
-  ModelSpace(const evaluate::RowMatrix& training, const std::vector<evaluate::Token>& tokens, const ModelSpaceOptions& options,
-             std::shared_ptr<const WeightCodec> codec = nullptr);
+  ModelSpace(const evaluate::RowMatrix& training, const std::vector<evaluate::Token>& tokens,
+             const ModelSpaceOptions& options, std::shared_ptr<const WeightCodec> codec = nullptr);
 
   const ModelSpaceOptions& options() const { return options_; }
   const evaluate::Standardisation& standardisation() const { return standardisation_; }
   const std::vector<size_t>& token_sizes() const { return token_sizes_; }  // [L]; their sum is D
   size_t size() const { return size_; }                                    // D
-  // Values that vary, the dimension that noise levels are placed by: the rest (dead channels, padding) is 0 in every member.
+  // Values that vary, the dimension that noise levels are placed by: the rest (dead channels,
+  // padding) is 0 in every member.
   size_t dimension() const { return dimension_; }
 
-  // weights: [M,W]; model vectors [M,D], of mean square 1 over the training members and the varying values.
+  // weights: [M,W]; model vectors [M,D], of mean square 1 over the training members and the varying
+  // values.
   evaluate::RowMatrix encode(const evaluate::RowMatrix& weights) const;
-  // The weights [W] of a model vector [D]. encode(decode(x)) == x but for rounding, except where x leaves its space (padding, dead values)
-  // and in `latent`, whose autoencoder only comes near.
+  // The weights [W] of a model vector [D]. encode(decode(x)) == x but for rounding, except where x
+  // leaves its space (padding, dead values) and in `latent`, whose autoencoder only comes near.
   evaluate::RowVector decode(const evaluate::RowVector& values) const;
 
-  // Of `basis`: directions of a token as orthonormal rows [K,size], and the factor between a model value and a coordinate.
+  // Of `basis`: directions of a token as orthonormal rows [K,size], and the factor between a model
+  // value and a coordinate.
   const evaluate::RowMatrix& directions(size_t token) const { return directions_[token]; }
   double coordinate_scale(size_t token) const { return coordinate_scale_[token]; }
 

@@ -1,5 +1,6 @@
-// The best denoisers there are, in closed form and double: of the training members themselves and of a Gaussian. What a trained denoiser,
-// a solver and every table of samples are held against (docs/numerics.md, "Sampling"). No LibTorch.
+// The best denoisers there are, in closed form and double: of the training members themselves and
+// of a Gaussian. What a trained denoiser, a solver and every table of samples are held against
+// (docs/numerics.md, "Sampling"). No LibTorch.
 //
 // Letters: N training members, D values of a member.
 #pragma once
@@ -19,8 +20,9 @@ struct Posterior {
   double entropy_nats = 0;  // ln N where nothing is decided, 0 where all is
 };
 
-// Denoiser of the N members, each as likely as the others: the perfect memoriser. E[x0 | z] is the mean of the members weighted by the
-// softmax of -|z - alpha z_n|^2 / (2 sigma^2). Sound at every level, pure noise and no noise included. O(N D) a call.
+// Denoiser of the N members, each as likely as the others: the perfect memoriser. E[x0 | z] is the
+// mean of the members weighted by the softmax of -|z - alpha z_n|^2 / (2 sigma^2). Sound at every
+// level, pure noise and no noise included. O(N D) a call.
 class MemberOracle {
  public:
   // members: [N,D], N >= 1; borrowed, must outlive the oracle.
@@ -33,11 +35,13 @@ class MemberOracle {
   const RowMatrix* members_;
 };
 
-// Denoiser of a Gaussian of independent values, and what the probability-flow equation does with it.
+// Denoiser of a Gaussian of independent values, and what the probability-flow equation does with
+// it.
 class GaussianOracle {
  public:
   // mean, variance: [D]; variances may be 0.
-  GaussianOracle(RowVector mean, RowVector variance) : mean_(std::move(mean)), variance_(std::move(variance)) {}
+  GaussianOracle(RowVector mean, RowVector variance)
+      : mean_(std::move(mean)), variance_(std::move(variance)) {}
 
   RowVector predict(const RowVector& z, const NoiseLevel& level) const;
   // Where z at a level arrives at another one, exactly.

@@ -1,4 +1,5 @@
-// A trained sampler to its package: int8, the population's activation ranges, golden seeds made by the device's own sampler.
+// A trained sampler to its package: int8, the population's activation ranges, golden seeds made by
+// the device's own sampler.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +20,8 @@ struct PackSamplerOptions {
   std::string report;      // JSON of figurine-train evaluate generation; empty: none
   uint32_t steps = 20;     // evaluations where nobody says otherwise
   SolverMethod method = SolverMethod::kDpmSolverPlusPlus2M;
-  uint32_t golden_seeds = 2;       // seeds 0, 1, ... whose weights every device must arrive at; emulated CPUs take seconds for one
+  uint32_t golden_seeds = 2;  // seeds 0, 1, ... whose weights every device must arrive at; emulated
+                              // CPUs take seconds for one
   uint32_t calibration_poses = 8;  // of every training member, for the ranges
   quantize::CalibrationOptions calibration;
   uint32_t threads = 1;

@@ -1,14 +1,18 @@
-// Processes that train together, and the few things they say to each other: c10d's Gloo over TCP, met at a TCPStore of rank 0.
+// Processes that train together, and the few things they say to each other: c10d's Gloo over TCP,
+// met at a TCPStore of rank 0.
 //
 // Who is who comes from the environment:
 //
-//   RANK, WORLD_SIZE, MASTER_ADDR, MASTER_PORT              by hand, or by a launcher; they come first
-//   SLURM_PROCID, SLURM_STEP_NUM_TASKS, SLURM_STEP_NODELIST inside srun; where rank 0 is: MASTER_ADDR, or the step's first node
+//   RANK, WORLD_SIZE, MASTER_ADDR, MASTER_PORT              by hand, or by a launcher; they come
+//   first SLURM_PROCID, SLURM_STEP_NUM_TASKS, SLURM_STEP_NODELIST inside srun; where rank 0 is:
+//   MASTER_ADDR, or the step's first node
 //
-// Without them a process is alone: rank 0 of 1, for which everything here returns at once and changes no bit. SLURM_NTASKS is not looked
-// at, because a batch script outside srun has it, too, and would wait for ranks that nobody starts.
+// Without them a process is alone: rank 0 of 1, for which everything here returns at once and
+// changes no bit. SLURM_NTASKS is not looked at, because a batch script outside srun has it, too,
+// and would wait for ranks that nobody starts.
 //
-// Messages run between the addresses by which the machines reach MASTER_ADDR, or over the interface GLOO_SOCKET_IFNAME.
+// Messages run between the addresses by which the machines reach MASTER_ADDR, or over the interface
+// GLOO_SOCKET_IFNAME.
 #pragma once
 
 #include <torch/torch.h>
@@ -43,8 +47,9 @@ class PeerLost : public InputError {
 
 class ProcessGroup {
  public:
-  // Waits for all ranks; the process ignores SIGPIPE from then on. Whatever waits for another rank, here or later, does so for timeout_s at
-  // most and then throws PeerLost; where a rank's process ends, its connections do, and the others hear of it at once.
+  // Waits for all ranks; the process ignores SIGPIPE from then on. Whatever waits for another rank,
+  // here or later, does so for timeout_s at most and then throws PeerLost; where a rank's process
+  // ends, its connections do, and the others hear of it at once.
   ProcessGroup(const RankPlace& place, double timeout_s);
   ~ProcessGroup();
   ProcessGroup(const ProcessGroup&) = delete;
@@ -56,11 +61,13 @@ class ProcessGroup {
   std::string name() const;                        // "rank 1 of 4"
 
   // Every rank calls these in the same order with tensors of the same shape, contiguous.
-  void sum(torch::Tensor& values);                                         // over all ranks, in place: the same bits on every rank
-  void broadcast(torch::Tensor& values);                                   // rank 0's
-  std::string broadcast(const std::string& text);                          // rank 0's
-  void barrier();                                                          // returns when all are here
-  void expect_same(const torch::Tensor& values, const std::string& what);  // float; throws InputError where the bits are not rank 0's
+  void sum(torch::Tensor& values);        // over all ranks, in place: the same bits on every rank
+  void broadcast(torch::Tensor& values);  // rank 0's
+  std::string broadcast(const std::string& text);  // rank 0's
+  void barrier();                                  // returns when all are here
+  void expect_same(
+      const torch::Tensor& values,
+      const std::string& what);  // float; throws InputError where the bits are not rank 0's
 
  private:
   struct Impl;

@@ -11,11 +11,13 @@ namespace figurine::generate {
 
 namespace {
 
-// Appends a row's integers and returns their scale: the largest at 127. A row of zeros gets a scale of 1.
+// Appends a row's integers and returns their scale: the largest at 127. A row of zeros gets a scale
+// of 1.
 template <class Row>
 float append_row(const Row& row, size_t count, std::vector<int8_t>& out) {
   double largest = 0;
-  for (size_t k = 0; k < count; ++k) largest = std::max(largest, std::abs(double(row[static_cast<Eigen::Index>(k)])));
+  for (size_t k = 0; k < count; ++k)
+    largest = std::max(largest, std::abs(double(row[static_cast<Eigen::Index>(k)])));
   const auto scale = largest > 1e-30 ? static_cast<float>(largest / kWeightMax) : 1.0f;
   for (size_t k = 0; k < count; ++k) {
     const double steps = std::nearbyint(double(row[static_cast<Eigen::Index>(k)]) / double{scale});
@@ -24,15 +26,19 @@ float append_row(const Row& row, size_t count, std::vector<int8_t>& out) {
   return scale;
 }
 
-bool same(const MapStatistics& a, const MapStatistics& b) { return a.mean == b.mean && a.scale == b.scale; }
+bool same(const MapStatistics& a, const MapStatistics& b) {
+  return a.mean == b.mean && a.scale == b.scale;
+}
 bool same(const HeadDecoding& a, const HeadDecoding& b) {
-  return a.offset_scale_m == b.offset_scale_m && a.spacing_scale == b.spacing_scale && a.max_log_scale == b.max_log_scale &&
-         a.opacity_bias == b.opacity_bias && a.sh_degree == b.sh_degree;
+  return a.offset_scale_m == b.offset_scale_m && a.spacing_scale == b.spacing_scale &&
+         a.max_log_scale == b.max_log_scale && a.opacity_bias == b.opacity_bias &&
+         a.sh_degree == b.sh_degree;
 }
 
 }  // namespace
 
-void pooled_pose_statistics(const Population& population, std::vector<float>& mean, std::vector<float>& covariance) {
+void pooled_pose_statistics(const Population& population, std::vector<float>& mean,
+                            std::vector<float>& covariance) {
   const size_t size = 3 * population.pose_joints.size();
   Eigen::VectorXd first = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(size));
   Eigen::MatrixXd second = Eigen::MatrixXd::Zero(first.size(), first.size());
@@ -40,22 +46,29 @@ void pooled_pose_statistics(const Population& population, std::vector<float>& me
   double members = 0;
   for (size_t m = 0; m < population.size(); ++m) {
     if (population.members[m].split != Split::kTrain) continue;
-    const Eigen::VectorXd centre = Eigen::Map<const Eigen::VectorXf>(population.pose_mean.data() + m * size, first.size()).cast<double>();
+    const Eigen::VectorXd centre =
+        Eigen::Map<const Eigen::VectorXf>(population.pose_mean.data() + m * size, first.size())
+            .cast<double>();
     pose_covariance(population, m, own);
     first += centre;
-    second += Eigen::Map<const Eigen::MatrixXf>(own.data(), first.size(), first.size()).cast<double>() + centre * centre.transpose();
+    second +=
+        Eigen::Map<const Eigen::MatrixXf>(own.data(), first.size(), first.size()).cast<double>() +
+        centre * centre.transpose();
     ++members;
   }
   first /= members;
   const Eigen::MatrixXd total = second / members - first * first.transpose();
   mean.resize(size), covariance.resize(size * size);
   Eigen::Map<Eigen::VectorXf>(mean.data(), first.size()) = first.cast<float>();
-  Eigen::Map<Eigen::MatrixXf>(covariance.data(), first.size(), first.size()) = (0.5 * (total + total.transpose())).cast<float>();
+  Eigen::Map<Eigen::MatrixXf>(covariance.data(), first.size(), first.size()) =
+      (0.5 * (total + total.transpose())).cast<float>();
 }
 
-QuantisedSampler::QuantisedSampler(const TrainedSampler& trained, std::vector<Quantisation> ranges, const std::string& name) {
+QuantisedSampler::QuantisedSampler(const TrainedSampler& trained, std::vector<Quantisation> ranges,
+                                   const std::string& name) {
   if (trained.settings.space.variant != Variant::kBasis) {
-    throw InputError(std::string("sampler: variant ") + to_string(trained.settings.space.variant) + " has no package; basis has");
+    throw InputError(std::string("sampler: variant ") + to_string(trained.settings.space.variant) +
+                     " has no package; basis has");
   }
   const Population& population = trained.population->package.population();
   sampler_.name = name;
@@ -74,9 +87,11 @@ void QuantisedSampler::take_what_members_share(const Population& population) {
   for (const PopulationMember& member : population.members) {
     if (member.split != Split::kTrain) continue;
     if (first == nullptr) first = &member;
-    if (!same(member.map_statistics, first->map_statistics) || !same(member.decoding, first->decoding)) {
-      throw InputError("population '" + population.name + "': member '" + member.name + "' has other maps or another decoding than '" +
-                       first->name + "'; a sampler needs one for all");
+    if (!same(member.map_statistics, first->map_statistics) ||
+        !same(member.decoding, first->decoding)) {
+      throw InputError("population '" + population.name + "': member '" + member.name +
+                       "' has other maps or another decoding than '" + first->name +
+                       "'; a sampler needs one for all");
     }
   }
   sampler_.body_name = population.body_name, sampler_.body_hash = population.body_hash;
@@ -100,18 +115,22 @@ void QuantisedSampler::take_what_members_share(const Population& population) {
 void QuantisedSampler::quantise_space(const TrainedSampler& trained) {
   const ModelSpace& space = *trained.space;
   const evaluate::Standardisation& standardisation = space.standardisation();
-  for (Eigen::Index j = 0; j < standardisation.mean().size(); ++j) mean_.push_back(static_cast<float>(standardisation.mean()[j]));
+  for (Eigen::Index j = 0; j < standardisation.mean().size(); ++j)
+    mean_.push_back(static_cast<float>(standardisation.mean()[j]));
   for (size_t l = 0; l < space.token_sizes().size(); ++l) {
     const evaluate::RowMatrix& directions = space.directions(l);
     sampler_.ranks.push_back(static_cast<uint32_t>(directions.rows()));
-    // A direction's entry of a value that does not vary is zero: the value stays at its mean, as restore() has it.
+    // A direction's entry of a value that does not vary is zero: the value stays at its mean, as
+    // restore() has it.
     const double factor = standardisation.scale(l) * space.coordinate_scale(l);
     for (Eigen::Index k = 0; k < directions.rows(); ++k) {
-      const float scale = append_row(directions.row(k), static_cast<size_t>(directions.cols()), directions_);
+      const float scale =
+          append_row(directions.row(k), static_cast<size_t>(directions.cols()), directions_);
       direction_scale_.push_back(static_cast<float>(double{scale} * factor));
     }
   }
-  sampler_.mean = mean_, sampler_.directions = directions_, sampler_.direction_scale = direction_scale_;
+  sampler_.mean = mean_, sampler_.directions = directions_,
+  sampler_.direction_scale = direction_scale_;
 }
 
 void QuantisedSampler::quantise_transformer(const TrainedSampler& trained) {
@@ -124,7 +143,8 @@ void QuantisedSampler::quantise_transformer(const TrainedSampler& trained) {
   const torch::Tensor flat = transformer.weights().detach().contiguous();
   const float* weights = flat.const_data_ptr<float>();
   const auto end_of = [](const std::string& name, const char* end) { return name.ends_with(end); };
-  // The trainer's list has the package's order: projections, position, time, blocks, last norm, projections back.
+  // The trainer's list has the package's order: projections, position, time, blocks, last norm,
+  // projections back.
   for (const FlatParameter& parameter : transformer.layout().list()) {
     const float* from = weights + parameter.begin;
     const int64_t size = parameter.count();

@@ -1,5 +1,5 @@
-// A trained sampler as its package has it: directions and matrices in int8, every one of their rows with a scale of its own, and what all
-// avatars of its population share.
+// A trained sampler as its package has it: directions and matrices in int8, every one of their rows
+// with a scale of its own, and what all avatars of its population share.
 #pragma once
 
 #include <array>
@@ -15,9 +15,11 @@ namespace figurine::generate {
 // Owns what `view` borrows, but for the golden pose, which is the population's.
 class QuantisedSampler {
  public:
-  // ranges: of the avatars' values (activation_ranges.h). Throws InputError if the sampler is of another variant than `basis`: the others
-  // are too large for a device; or if its training members do not share how their maps are standardised and their heads decoded.
-  QuantisedSampler(const TrainedSampler& trained, std::vector<Quantisation> ranges, const std::string& name);
+  // ranges: of the avatars' values (activation_ranges.h). Throws InputError if the sampler is of
+  // another variant than `basis`: the others are too large for a device; or if its training members
+  // do not share how their maps are standardised and their heads decoded.
+  QuantisedSampler(const TrainedSampler& trained, std::vector<Quantisation> ranges,
+                   const std::string& name);
   QuantisedSampler(const QuantisedSampler&) = delete;
   QuantisedSampler& operator=(const QuantisedSampler&) = delete;
 
@@ -30,12 +32,14 @@ class QuantisedSampler {
   void quantise_transformer(const TrainedSampler& trained);
 
   Sampler sampler_;
-  std::vector<float> mean_, direction_scale_, row_scale_, bias_, position_, norm_, pose_mean_, pose_covariance_;
+  std::vector<float> mean_, direction_scale_, row_scale_, bias_, position_, norm_, pose_mean_,
+      pose_covariance_;
   std::vector<int8_t> directions_, matrices_;
 };
 
-// Mean and covariance of all training members' poses together, from each member's own: the law of total covariance, every member alike.
-// mean: [3P]; covariance: [3P,3P], symmetric to the bit.
-void pooled_pose_statistics(const Population& population, std::vector<float>& mean, std::vector<float>& covariance);
+// Mean and covariance of all training members' poses together, from each member's own: the law of
+// total covariance, every member alike. mean: [3P]; covariance: [3P,3P], symmetric to the bit.
+void pooled_pose_statistics(const Population& population, std::vector<float>& mean,
+                            std::vector<float>& covariance);
 
 }  // namespace figurine::generate

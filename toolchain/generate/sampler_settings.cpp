@@ -16,9 +16,10 @@ const TransformerPreset& find_transformer_preset(const std::string& name) {
 }
 
 NoiseSchedule noise_schedule(const SamplerSettings& settings, size_t dimension) {
-  return value_or_throw(
-      NoiseSchedule::create({.dimension = dimension, .noisy_dimension_snr = settings.noisy_dimension_snr, .clean_snr = settings.clean_snr}),
-      "sampler");
+  return value_or_throw(NoiseSchedule::create({.dimension = dimension,
+                                               .noisy_dimension_snr = settings.noisy_dimension_snr,
+                                               .clean_snr = settings.clean_snr}),
+                        "sampler");
 }
 
 nlohmann::json to_json(const SamplerSettings& settings) {
@@ -56,14 +57,17 @@ SamplerSettings sampler_settings_from_json(const nlohmann::json& json, const std
   SamplerSettings settings;
   try {
     settings.space.variant = variant_from_string(json.at("variant").get<std::string>());
-    settings.space.rank = json.at("rank").get<size_t>(), settings.space.chunk = json.at("chunk").get<size_t>();
+    settings.space.rank = json.at("rank").get<size_t>(),
+    settings.space.chunk = json.at("chunk").get<size_t>();
     settings.shape = shape_from_json(json.at("shape"), where);
     settings.members = json.at("members").get<uint32_t>();
-    settings.clean_snr = json.at("clean_snr").get<double>(), settings.noisy_dimension_snr = json.at("noisy_dimension_snr").get<double>();
+    settings.clean_snr = json.at("clean_snr").get<double>(),
+    settings.noisy_dimension_snr = json.at("noisy_dimension_snr").get<double>();
     settings.batch = json.at("batch").get<uint32_t>(), settings.ema = json.at("ema").get<double>();
     settings.seed = json.at("seed").get<uint64_t>(), settings.bf16 = json.at("bf16").get<bool>();
     settings.threads = json.at("threads").get<uint32_t>();
-    settings.beta1 = json.at("beta1").get<double>(), settings.beta2 = json.at("beta2").get<double>();
+    settings.beta1 = json.at("beta1").get<double>(),
+    settings.beta2 = json.at("beta2").get<double>();
     settings.weight_decay = json.at("weight_decay").get<double>();
     settings.schedule.peak = json.at("learning_rate").get<double>();
     settings.schedule.ramp_iterations = json.at("ramp_iterations").get<uint64_t>();
@@ -73,9 +77,11 @@ SamplerSettings sampler_settings_from_json(const nlohmann::json& json, const std
       settings.autoencoder.channels = autoencoder.at("channels").get<int64_t>();
       settings.autoencoder.kl_weight = autoencoder.at("kl_weight").get<double>();
       settings.autoencoder.schedule.peak = autoencoder.at("learning_rate").get<double>();
-      settings.autoencoder.schedule.budget = {.iterations = autoencoder.at("iterations").get<uint64_t>(), .seconds = 0};
+      settings.autoencoder.schedule.budget = {
+          .iterations = autoencoder.at("iterations").get<uint64_t>(), .seconds = 0};
     }
-    settings.schedule.budget = {.iterations = json.at("iterations").get<uint64_t>(), .seconds = json.at("seconds").get<double>()};
+    settings.schedule.budget = {.iterations = json.at("iterations").get<uint64_t>(),
+                                .seconds = json.at("seconds").get<double>()};
   } catch (const nlohmann::json::exception& error) {
     throw InputError(where + ": " + error.what());
   }

@@ -1,4 +1,5 @@
-// What a sampler's training is told to do: everything that, with the population, decides the denoiser's weights. Kept in RUN/run.json.
+// What a sampler's training is told to do: everything that, with the population, decides the
+// denoiser's weights. Kept in RUN/run.json.
 #pragma once
 
 #include <cstdint>
@@ -18,16 +19,22 @@ struct TransformerPreset {
   int64_t d_model, blocks, heads, feed_forward;
 };
 
-// `paper` is the paper's; `device` is what ships (with the variant `basis`); `small` is for `nano`, where hundreds of runs are compared.
+// `paper` is the paper's; `device` is what ships (with the variant `basis`); `small` is for `nano`,
+// where hundreds of runs are compared.
 inline constexpr TransformerPreset kTransformerPresets[] = {
     {"small", 128, 4, 8, 512}, {"device", 256, 12, 16, 1024}, {"paper", 512, 12, 16, 2048}};
-const TransformerPreset& find_transformer_preset(const std::string& name);  // throws InputError naming the known ones
+const TransformerPreset& find_transformer_preset(
+    const std::string& name);  // throws InputError naming the known ones
 
-// Of the autoencoder of variant `latent`, which is trained before the denoiser, on the same batches' size and with the same betas.
+// Of the autoencoder of variant `latent`, which is trained before the denoiser, on the same
+// batches' size and with the same betas.
 struct AutoencoderSettings {
   int64_t channels = 4;     // of the latent map
   double kl_weight = 1e-3;  // against the mean square error of a standardised value
-  train::Schedule schedule{.peak = 1e-3, .ramp_iterations = 100, .floor_fraction = 0.02, .budget = {.iterations = 4000, .seconds = 0}};
+  train::Schedule schedule{.peak = 1e-3,
+                           .ramp_iterations = 100,
+                           .floor_fraction = 0.02,
+                           .budget = {.iterations = 4000, .seconds = 0}};
 };
 
 struct SamplerSettings {
@@ -43,10 +50,14 @@ struct SamplerSettings {
   bool bf16 = false;
   uint32_t threads = 1;
   double beta1 = 0.9, beta2 = 0.999, weight_decay = 0;
-  train::Schedule schedule{.peak = 2e-4, .ramp_iterations = 200, .floor_fraction = 0.02, .budget = {.iterations = 10000, .seconds = 0}};
+  train::Schedule schedule{.peak = 2e-4,
+                           .ramp_iterations = 200,
+                           .floor_fraction = 0.02,
+                           .budget = {.iterations = 10000, .seconds = 0}};
 };
 
-// Of a space whose vectors have so many varying values. Throws InputError if there is none with these ends.
+// Of a space whose vectors have so many varying values. Throws InputError if there is none with
+// these ends.
 NoiseSchedule noise_schedule(const SamplerSettings& settings, size_t dimension);
 
 nlohmann::json to_json(const SamplerSettings& settings);

@@ -27,7 +27,8 @@ using evaluate::RowMatrix;
 namespace {
 
 constexpr int kSamplerFormat = 1;
-constexpr int64_t kValidationDraws = 16;  // noise levels for each validation member, always the same ones
+constexpr int64_t kValidationDraws =
+    16;  // noise levels for each validation member, always the same ones
 enum Stream : uint64_t { kLevels = 1, kNoise = 2, kValidationNoise = 3 };
 
 struct NoisyBatch {
@@ -35,20 +36,23 @@ struct NoisyBatch {
 };
 
 // One row of a batch: member x at the schedule's place u.
-void add_noisy(NoisyBatch& batch, int64_t row, const torch::Tensor& x, const torch::Tensor& noise, const NoiseLevel& level) {
+void add_noisy(NoisyBatch& batch, int64_t row, const torch::Tensor& x, const torch::Tensor& noise,
+               const NoiseLevel& level) {
   batch.clean[row].copy_(x);
   batch.z[row].copy_(x * level.alpha + noise * level.sigma);
   batch.lambda[row] = level.lambda;
 }
 
 NoisyBatch empty_batch(int64_t rows, int64_t size) {
-  return {torch::empty({rows, size}), torch::empty({rows}, torch::kFloat64), torch::empty({rows, size})};
+  return {torch::empty({rows, size}), torch::empty({rows}, torch::kFloat64),
+          torch::empty({rows, size})};
 }
 
 // The denoiser and the batches that it learns from.
 class Denoising : public FlatModel {
  public:
-  Denoising(const SamplerSettings& settings, size_t dimension, const RowMatrix& training, const RowMatrix& validation)
+  Denoising(const SamplerSettings& settings, size_t dimension, const RowMatrix& training,
+            const RowMatrix& validation)
       : settings_(settings),
         noise_(noise_schedule(settings, dimension)),
         training_(to_tensor(training)),
@@ -66,13 +70,17 @@ class Denoising : public FlatModel {
     NoisyBatch noisy = empty_batch(share.count, size);
     for (int64_t row = 0; row < share.count; ++row) {
       const int64_t place = share.first + row;
-      const uint64_t counter = iteration * static_cast<uint64_t>(batch) + static_cast<uint64_t>(place);
-      const double u = (static_cast<double>(place) + static_cast<double>(train::random_unit(settings_.seed, kLevels, counter))) /
+      const uint64_t counter =
+          iteration * static_cast<uint64_t>(batch) + static_cast<uint64_t>(place);
+      const double u = (static_cast<double>(place) +
+                        static_cast<double>(train::random_unit(settings_.seed, kLevels, counter))) /
                        static_cast<double>(batch);
       const auto member = static_cast<int64_t>(order_.item(counter));
-      add_noisy(noisy, row, training_[member], draw_noise(settings_.seed, kNoise, counter, size), noise_.level(u));
+      add_noisy(noisy, row, training_[member], draw_noise(settings_.seed, kNoise, counter, size),
+                noise_.level(u));
     }
-    return torch::mse_loss(transformer_.forward(noisy.z, noisy.lambda, settings_.bf16), noisy.clean);
+    return torch::mse_loss(transformer_.forward(noisy.z, noisy.lambda, settings_.bf16),
+                           noisy.clean);
   }
 
   // At noise that never changes.
@@ -83,8 +91,10 @@ class Denoising : public FlatModel {
     for (int64_t first = 0; first < rows; first += settings_.batch) {
       const int64_t count = std::min<int64_t>(settings_.batch, rows - first);
       const auto part = [&](const torch::Tensor& all) { return all.narrow(0, first, count); };
-      const torch::Tensor x = transformer_.forward(part(validation_.z), part(validation_.lambda), settings_.bf16);
-      sum += torch::mse_loss(x, part(validation_.clean)).item<double>() * static_cast<double>(count);
+      const torch::Tensor x =
+          transformer_.forward(part(validation_.z), part(validation_.lambda), settings_.bf16);
+      sum +=
+          torch::mse_loss(x, part(validation_.clean)).item<double>() * static_cast<double>(count);
     }
     return sum / static_cast<double>(rows);
   }
@@ -96,7 +106,8 @@ class Denoising : public FlatModel {
     validation_ = empty_batch(count * kValidationDraws, size);
     for (int64_t i = 0; i < count * kValidationDraws; ++i) {
       const double u = (static_cast<double>(i % kValidationDraws) + 0.5) / kValidationDraws;
-      const torch::Tensor noise = draw_noise(settings_.seed, kValidationNoise, static_cast<uint64_t>(i), size);
+      const torch::Tensor noise =
+          draw_noise(settings_.seed, kValidationNoise, static_cast<uint64_t>(i), size);
       add_noisy(validation_, i, members[i / kValidationDraws], noise, noise_.level(u));
     }
   }
@@ -109,8 +120,9 @@ class Denoising : public FlatModel {
   Transformer transformer_;
 };
 
-nlohmann::json describe(const SamplerRequest& request, const SamplerSettings& settings, const train::PackageFile& population,
-                        size_t dimension, size_t training, size_t validation) {
+nlohmann::json describe(const SamplerRequest& request, const SamplerSettings& settings,
+                        const train::PackageFile& population, size_t dimension, size_t training,
+                        size_t validation) {
   return {{"format", kSamplerFormat},
           {"status", "running"},
           {"tool", "figurine-train " FIGURINE_VERSION},
@@ -134,13 +146,15 @@ struct Members {
   RowMatrix training, validation;  // [N,W]
 };
 
-Members members_of(const Population& population, const SamplerSettings& settings, const std::string& path) {
+Members members_of(const Population& population, const SamplerSettings& settings,
+                   const std::string& path) {
   const RowMatrix weights = evaluate::read_weights(population);
-  Members members{rows_of(population, weights, Split::kTrain, settings.members), rows_of(population, weights, Split::kValidation)};
+  Members members{rows_of(population, weights, Split::kTrain, settings.members),
+                  rows_of(population, weights, Split::kValidation)};
   if (members.training.rows() < 2) throw InputError(path + ": has fewer than two training members");
   if (settings.members > static_cast<uint32_t>(members.training.rows())) {
-    throw InputError(path + ": has " + std::to_string(members.training.rows()) + " training members, " + std::to_string(settings.members) +
-                     " were asked for");
+    throw InputError(path + ": has " + std::to_string(members.training.rows()) +
+                     " training members, " + std::to_string(settings.members) + " were asked for");
   }
   return members;
 }
@@ -160,18 +174,23 @@ nlohmann::json read_run(const train::RunDirectory& run) {
   return json;
 }
 
-void check_population(const nlohmann::json& description, const train::PackageFile& population, const train::RunDirectory& run,
-                      const std::string& path) {
-  const std::string own = description.at("population").value("hash", ""), given = format_hash(population.package.content_hash());
-  if (own != given) throw InputError(run.path + ": was trained on population " + own + ", " + path + " is " + given);
+void check_population(const nlohmann::json& description, const train::PackageFile& population,
+                      const train::RunDirectory& run, const std::string& path) {
+  const std::string own = description.at("population").value("hash", ""),
+                    given = format_hash(population.package.content_hash());
+  if (own != given)
+    throw InputError(run.path + ": was trained on population " + own + ", " + path + " is " +
+                     given);
 }
 
 }  // namespace
 
-RowMatrix rows_of(const Population& population, const RowMatrix& weights, Split split, uint32_t most) {
+RowMatrix rows_of(const Population& population, const RowMatrix& weights, Split split,
+                  uint32_t most) {
   std::vector<Eigen::Index> rows;
   for (size_t m = 0; m < population.size(); ++m) {
-    if (population.members[m].split == split && (most == 0 || rows.size() < most)) rows.push_back(static_cast<Eigen::Index>(m));
+    if (population.members[m].split == split && (most == 0 || rows.size() < most))
+      rows.push_back(static_cast<Eigen::Index>(m));
   }
   return weights(rows, Eigen::all);
 }
@@ -195,11 +214,14 @@ struct Plan {
 Plan make_plan(const SamplerRequest& request, const train::PackageFile& population) {
   const train::RunDirectory run{request.run};
   const bool exists = std::filesystem::exists(run.run_json());
-  if (exists && !request.resume) throw InputError(request.run + ": holds a run already; --resume goes on with it");
-  if (!exists && request.resume) throw InputError(request.run + ": no run to resume (run.json is missing)");
+  if (exists && !request.resume)
+    throw InputError(request.run + ": holds a run already; --resume goes on with it");
+  if (!exists && request.resume)
+    throw InputError(request.run + ": no run to resume (run.json is missing)");
   Plan plan{.settings = request.settings, .description = {}};
   if (!exists) {
-    if (plan.settings.threads == 0) plan.settings.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+    if (plan.settings.threads == 0)
+      plan.settings.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
     return plan;
   }
   plan.description = read_run(run);
@@ -216,15 +238,20 @@ nlohmann::json without_threads(nlohmann::json settings) {
 }
 
 // Tells rank 0's plan to all ranks.
-void share_plan(Plan& plan, ProcessGroup& group, const SamplerRequest& request, const train::PackageFile& population) {
+void share_plan(Plan& plan, ProcessGroup& group, const SamplerRequest& request,
+                const train::PackageFile& population) {
   const std::string hash = format_hash(population.package.content_hash());
   nlohmann::json told;
   if (group.leads()) {
-    told = {{"settings", to_json(plan.settings)}, {"new", plan.description.empty()}, {"finished", plan.finished}, {"population", hash}};
+    told = {{"settings", to_json(plan.settings)},
+            {"new", plan.description.empty()},
+            {"finished", plan.finished},
+            {"population", hash}};
   }
   told = nlohmann::json::parse(group.broadcast(told.dump()));
   if (told.at("population").get<std::string>() != hash) {
-    throw InputError(group.name() + ": " + request.population + " is " + hash + ", rank 0 has " + told.at("population").get<std::string>());
+    throw InputError(group.name() + ": " + request.population + " is " + hash + ", rank 0 has " +
+                     told.at("population").get<std::string>());
   }
   if (!group.leads()) {
     if (!told.at("new").get<bool>()) {
@@ -232,7 +259,8 @@ void share_plan(Plan& plan, ProcessGroup& group, const SamplerRequest& request, 
       if (request.settings.threads > 0) plan.settings.threads = request.settings.threads;
     } else if (without_threads(told.at("settings")) == without_threads(to_json(request.settings))) {
       plan.settings = request.settings;
-      if (plan.settings.threads == 0) plan.settings.threads = told.at("settings").at("threads").get<uint32_t>();
+      if (plan.settings.threads == 0)
+        plan.settings.threads = told.at("settings").at("threads").get<uint32_t>();
     } else {
       throw InputError(group.name() + ": was asked for other settings than rank 0");
     }
@@ -245,7 +273,8 @@ SamplerResult result_of(const nlohmann::json& description) {
   return {.iteration = description.value("iterations", uint64_t{0}),
           .seconds = description.value("train_seconds", 0.0),
           .loss = description.value("loss", 0.0),
-          .validation_loss = validation.is_number() ? validation.get<double>() : std::numeric_limits<double>::quiet_NaN(),
+          .validation_loss = validation.is_number() ? validation.get<double>()
+                                                    : std::numeric_limits<double>::quiet_NaN(),
           .was_finished = true};
 }
 
@@ -254,7 +283,9 @@ nlohmann::json to_json(const FlatProgress& progress, const char* status) {
           {"iterations", progress.iteration},
           {"train_seconds", progress.seconds},
           {"loss", progress.loss},
-          {"validation_loss", std::isfinite(progress.validation_loss) ? nlohmann::json(progress.validation_loss) : nlohmann::json()},
+          {"validation_loss", std::isfinite(progress.validation_loss)
+                                  ? nlohmann::json(progress.validation_loss)
+                                  : nlohmann::json()},
           {"log", log_to_json(progress.log)}};
 }
 
@@ -263,21 +294,25 @@ double time_evaluation(const Transformer& transformer, const SamplerSettings& se
   constexpr int kTimes = 5;
   const torch::NoGradGuard no_gradient;
   const torch::Tensor z =
-      torch::zeros({1, std::accumulate(settings.shape.token_sizes.begin(), settings.shape.token_sizes.end(), int64_t{0})});
+      torch::zeros({1, std::accumulate(settings.shape.token_sizes.begin(),
+                                       settings.shape.token_sizes.end(), int64_t{0})});
   const torch::Tensor lambda = torch::zeros({1}, torch::kFloat64);
   std::vector<double> seconds;
   for (int i = 0; i <= kTimes; ++i) {  // the first one does not count
     const auto start = std::chrono::steady_clock::now();
     transformer.forward(z, lambda, settings.bf16);
-    if (i > 0) seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    if (i > 0)
+      seconds.push_back(
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
   std::nth_element(seconds.begin(), seconds.begin() + kTimes / 2, seconds.end());
   return seconds[kTimes / 2];
 }
 
 // The run's files besides the checkpoint, after one was written.
-void save_run(const train::RunDirectory& run, nlohmann::json& description, const Transformer& transformer, const torch::Tensor& average,
-              const char* status, const FlatProgress& progress) {
+void save_run(const train::RunDirectory& run, nlohmann::json& description,
+              const Transformer& transformer, const torch::Tensor& average, const char* status,
+              const FlatProgress& progress) {
   save_parameters(run.weights(), transformer.layout(), average);
   save_log(run.log(), progress.log);
   description.update(to_json(progress, status));
@@ -289,9 +324,15 @@ void save_run(const train::RunDirectory& run, nlohmann::json& description, const
 
 namespace {
 
-std::string autoencoder_file(const train::RunDirectory& run) { return run.path + "/autoencoder.safetensors"; }
-std::string autoencoder_log(const train::RunDirectory& run) { return run.path + "/autoencoder_log.csv"; }
-std::string autoencoder_checkpoint(const train::RunDirectory& run) { return run.path + "/autoencoder_checkpoint.safetensors"; }
+std::string autoencoder_file(const train::RunDirectory& run) {
+  return run.path + "/autoencoder.safetensors";
+}
+std::string autoencoder_log(const train::RunDirectory& run) {
+  return run.path + "/autoencoder_log.csv";
+}
+std::string autoencoder_checkpoint(const train::RunDirectory& run) {
+  return run.path + "/autoencoder_checkpoint.safetensors";
+}
 
 FlatTraining training_of(const SamplerRequest& request, const SamplerSettings& settings) {
   return {.title = "sampler",
@@ -308,23 +349,28 @@ FlatTraining training_of(const SamplerRequest& request, const SamplerSettings& s
           .quiet = request.quiet};
 }
 
-// Stage one of variant `latent`. Where it is done already it only takes what it was done with. description: the run's, on rank 0.
-void train_autoencoder(const std::shared_ptr<Autoencoder>& autoencoder, const SamplerRequest& request, const SamplerSettings& settings,
-                       const Members& members, const std::vector<evaluate::Token>& tokens, ProcessGroup& group,
-                       nlohmann::json& description) {
+// Stage one of variant `latent`. Where it is done already it only takes what it was done with.
+// description: the run's, on rank 0.
+void train_autoencoder(const std::shared_ptr<Autoencoder>& autoencoder,
+                       const SamplerRequest& request, const SamplerSettings& settings,
+                       const Members& members, const std::vector<evaluate::Token>& tokens,
+                       ProcessGroup& group, nlohmann::json& description) {
   const train::RunDirectory run{request.run};
   const evaluate::Standardisation standardisation(members.training, tokens);
   Autoencoding autoencoding(autoencoder, settings, standardisation.standardise(members.training),
                             standardisation.standardise(members.validation));
   FlatTraining training = training_of(request, settings);
-  training.title = "autoencoder", training.checkpoint = autoencoder_checkpoint(run), training.schedule = settings.autoencoder.schedule;
-  FlatTrainer trainer(autoencoding, group, training, [&](const char* status, const FlatProgress& progress) {
-    save_parameters(autoencoder_file(run), autoencoder->parameters().layout(), trainer.average());
-    save_log(autoencoder_log(run), progress.log);
-    description["autoencoder"] = to_json(progress, status);
-    description["status"] = status == std::string("finished") ? "running" : status;
-    train::write_json(run.run_json(), description);
-  });
+  training.title = "autoencoder", training.checkpoint = autoencoder_checkpoint(run),
+  training.schedule = settings.autoencoder.schedule;
+  FlatTrainer trainer(
+      autoencoding, group, training, [&](const char* status, const FlatProgress& progress) {
+        save_parameters(autoencoder_file(run), autoencoder->parameters().layout(),
+                        trainer.average());
+        save_log(autoencoder_log(run), progress.log);
+        description["autoencoder"] = to_json(progress, status);
+        description["status"] = status == std::string("finished") ? "running" : status;
+        train::write_json(run.run_json(), description);
+      });
   if (group.leads() && request.resume) {
     const nlohmann::json before = description.value("autoencoder", nlohmann::json::object());
     trainer.resume(before.value("log", nlohmann::json::array()));
@@ -333,8 +379,8 @@ void train_autoencoder(const std::shared_ptr<Autoencoder>& autoencoder, const Sa
   autoencoding.weights().copy_(trainer.average());
 }
 
-ModelSpace make_space(const Members& members, const std::vector<evaluate::Token>& tokens, const SamplerSettings& settings,
-                      std::shared_ptr<const WeightCodec> codec) {
+ModelSpace make_space(const Members& members, const std::vector<evaluate::Token>& tokens,
+                      const SamplerSettings& settings, std::shared_ptr<const WeightCodec> codec) {
   return {members.training, tokens, settings.space, std::move(codec)};
 }
 
@@ -343,37 +389,47 @@ ModelSpace make_space(const Members& members, const std::vector<evaluate::Token>
 SamplerResult train_sampler(const SamplerRequest& request) {
   const train::RunDirectory run{request.run};
   ProcessGroup group(request.place, request.rank_timeout_s);
-  const train::PackageFile population = train::open_package(request.population, PackageKind::kPopulation);
+  const train::PackageFile population =
+      train::open_package(request.population, PackageKind::kPopulation);
   std::optional<ports::FolderLock> lock;  // of two trainings in one folder the slower one would win
-  const auto lock_run = [&] { lock.emplace(value_or_throw(ports::FolderLock::acquire(request.run), "cannot train")); };
+  const auto lock_run = [&] {
+    lock.emplace(value_or_throw(ports::FolderLock::acquire(request.run), "cannot train"));
+  };
   if (group.leads() && std::filesystem::exists(run.run_json())) lock_run();
   Plan plan = group.leads() ? make_plan(request, population) : Plan{};
   share_plan(plan, group, request, population);
-  if (plan.finished) return group.leads() ? result_of(plan.description) : SamplerResult{.was_finished = true};
+  if (plan.finished)
+    return group.leads() ? result_of(plan.description) : SamplerResult{.was_finished = true};
   SamplerSettings& settings = plan.settings;
   const Members members = members_of(population.package.population(), settings, request.population);
   const std::vector<evaluate::Token> tokens = tokens_of(population.package.population());
   train::use_threads(settings.threads);
 
-  // What can be wrong is found before anything is written: the tokens of `latent` are known before its autoencoder is trained.
+  // What can be wrong is found before anything is written: the tokens of `latent` are known before
+  // its autoencoder is trained.
   std::shared_ptr<Autoencoder> autoencoder;
   if (settings.space.variant == Variant::kLatent) {
-    autoencoder = std::make_shared<Autoencoder>(static_cast<size_t>(members.training.cols()), settings.autoencoder, settings.seed);
+    autoencoder = std::make_shared<Autoencoder>(static_cast<size_t>(members.training.cols()),
+                                                settings.autoencoder, settings.seed);
   }
   std::optional<ModelSpace> space;
   if (!autoencoder) space.emplace(make_space(members, tokens, settings, nullptr));
-  const std::vector<size_t>& token_sizes = autoencoder ? autoencoder->token_sizes() : space->token_sizes();
+  const std::vector<size_t>& token_sizes =
+      autoencoder ? autoencoder->token_sizes() : space->token_sizes();
   settings.shape.token_sizes.assign(token_sizes.begin(), token_sizes.end());
   check(settings.shape);
   check_batch(settings.batch, group, request.run);
-  const size_t dimension = space ? space->dimension() : std::accumulate(token_sizes.begin(), token_sizes.end(), size_t{0});
+  const size_t dimension = space
+                               ? space->dimension()
+                               : std::accumulate(token_sizes.begin(), token_sizes.end(), size_t{0});
   noise_schedule(settings, dimension);
   if (group.leads() && plan.description.empty()) {
     std::error_code error;
     std::filesystem::create_directories(request.run, error);
     if (error) throw InputError(request.run + ": cannot be created: " + error.message());
     lock_run();
-    plan.description = describe(request, settings, population, dimension, static_cast<size_t>(members.training.rows()),
+    plan.description = describe(request, settings, population, dimension,
+                                static_cast<size_t>(members.training.rows()),
                                 static_cast<size_t>(members.validation.rows()));
     train::write_json(run.run_json(), plan.description);
   }
@@ -382,12 +438,18 @@ SamplerResult train_sampler(const SamplerRequest& request) {
     space.emplace(make_space(members, tokens, settings, autoencoder));
   }
 
-  Denoising denoising(settings, dimension, space->encode(members.training), space->encode(members.validation));
-  FlatTrainer trainer(denoising, group, training_of(request, settings), [&](const char* status, const FlatProgress& progress) {
-    if (status == std::string("finished")) plan.description["seconds_per_evaluation"] = time_evaluation(denoising.transformer(), settings);
-    save_run(run, plan.description, denoising.transformer(), trainer.average(), status, progress);
-  });
-  if (group.leads() && request.resume) trainer.resume(plan.description.value("log", nlohmann::json::array()));
+  Denoising denoising(settings, dimension, space->encode(members.training),
+                      space->encode(members.validation));
+  FlatTrainer trainer(denoising, group, training_of(request, settings),
+                      [&](const char* status, const FlatProgress& progress) {
+                        if (status == std::string("finished"))
+                          plan.description["seconds_per_evaluation"] =
+                              time_evaluation(denoising.transformer(), settings);
+                        save_run(run, plan.description, denoising.transformer(), trainer.average(),
+                                 status, progress);
+                      });
+  if (group.leads() && request.resume)
+    trainer.resume(plan.description.value("log", nlohmann::json::array()));
   const FlatProgress progress = trainer.run();
   return {.iteration = progress.iteration,
           .seconds = progress.seconds,
@@ -401,20 +463,26 @@ TrainedSampler TrainedSampler::open(const std::string& path, const std::string& 
   const nlohmann::json description = read_run(run);
   TrainedSampler sampler;
   sampler.settings = sampler_settings_from_json(description.at("settings"), run.run_json());
-  const std::string where = population.empty() ? description.at("population").value("path", "") : population;
-  sampler.population = std::make_unique<train::PackageFile>(train::open_package(where, PackageKind::kPopulation));
+  const std::string where =
+      population.empty() ? description.at("population").value("path", "") : population;
+  sampler.population =
+      std::make_unique<train::PackageFile>(train::open_package(where, PackageKind::kPopulation));
   check_population(description, *sampler.population, run, where);
   const Population& people = sampler.population->package.population();
   const Members members = members_of(people, sampler.settings, where);
   std::shared_ptr<Autoencoder> autoencoder;
   if (sampler.settings.space.variant == Variant::kLatent) {
     autoencoder =
-        std::make_shared<Autoencoder>(static_cast<size_t>(members.training.cols()), sampler.settings.autoencoder, sampler.settings.seed);
-    load_parameters(autoencoder_file(run), autoencoder->parameters().layout(), autoencoder->parameters().weights());
+        std::make_shared<Autoencoder>(static_cast<size_t>(members.training.cols()),
+                                      sampler.settings.autoencoder, sampler.settings.seed);
+    load_parameters(autoencoder_file(run), autoencoder->parameters().layout(),
+                    autoencoder->parameters().weights());
   }
-  sampler.space = std::make_unique<ModelSpace>(make_space(members, tokens_of(people), sampler.settings, autoencoder));
+  sampler.space = std::make_unique<ModelSpace>(
+      make_space(members, tokens_of(people), sampler.settings, autoencoder));
   sampler.training = sampler.space->encode(members.training);
-  sampler.transformer = std::make_unique<Transformer>(sampler.settings.shape, sampler.settings.seed);
+  sampler.transformer =
+      std::make_unique<Transformer>(sampler.settings.shape, sampler.settings.seed);
   load_parameters(run.weights(), sampler.transformer->layout(), sampler.transformer->weights());
   return sampler;
 }

@@ -13,13 +13,14 @@ torch::Tensor to_tensor(const evaluate::RowMatrix& rows) {
 
 evaluate::RowMatrix to_rows(const torch::Tensor& values) {
   const torch::Tensor own = values.detach().contiguous();
-  return Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(own.const_data_ptr<float>(), own.size(0),
-                                                                                                 own.size(1))
+  return Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+             own.const_data_ptr<float>(), own.size(0), own.size(1))
       .cast<double>();
 }
 
 torch::Tensor draw_noise(uint64_t seed, uint64_t stream, uint64_t counter, int64_t size) {
-  auto generator = at::make_generator<at::CPUGeneratorImpl>(train::random_bits(seed, stream, counter));
+  auto generator =
+      at::make_generator<at::CPUGeneratorImpl>(train::random_bits(seed, stream, counter));
   return torch::randn({size}, generator);
 }
 

@@ -1,4 +1,5 @@
-// Between Eigen's rows in double and LibTorch's in float, and noise that is a function of its place.
+// Between Eigen's rows in double and LibTorch's in float, and noise that is a function of its
+// place.
 #pragma once
 
 #include <torch/torch.h>

@@ -15,21 +15,25 @@ constexpr double kPositionDeviation = 0.02;
 // Names and shapes of all parameters, in the order of the flat tensor.
 FlatLayout layout_of(const TransformerShape& shape) {
   FlatLayout layout;
-  const auto add = [&](const std::string& name, std::vector<int64_t> size) { layout.add(name, std::move(size)); };
+  const auto add = [&](const std::string& name, std::vector<int64_t> size) {
+    layout.add(name, std::move(size));
+  };
   const int64_t d = shape.d_model, tokens = static_cast<int64_t>(shape.token_sizes.size());
   for (int64_t l = 0; l < tokens; ++l) {
     add("proj." + std::to_string(l) + ".weight", {d, shape.token_sizes[static_cast<size_t>(l)]});
     add("proj." + std::to_string(l) + ".bias", {d});
   }
   add("position", {tokens + 1, d});
-  add("time.in.weight", {d, d}), add("time.in.bias", {d}), add("time.out.weight", {d, d}), add("time.out.bias", {d});
+  add("time.in.weight", {d, d}), add("time.in.bias", {d}), add("time.out.weight", {d, d}),
+      add("time.out.bias", {d});
   for (int64_t b = 0; b < shape.blocks; ++b) {
     const std::string block = "block." + std::to_string(b);
     add(block + ".norm_attention.weight", {d}), add(block + ".norm_attention.bias", {d});
     add(block + ".qkv.weight", {3 * d, d}), add(block + ".qkv.bias", {3 * d});
     add(block + ".attended.weight", {d, d}), add(block + ".attended.bias", {d});
     add(block + ".norm_feed_forward.weight", {d}), add(block + ".norm_feed_forward.bias", {d});
-    add(block + ".feed_in.weight", {shape.feed_forward, d}), add(block + ".feed_in.bias", {shape.feed_forward});
+    add(block + ".feed_in.weight", {shape.feed_forward, d}),
+        add(block + ".feed_in.bias", {shape.feed_forward});
     add(block + ".feed_out.weight", {d, shape.feed_forward}), add(block + ".feed_out.bias", {d});
   }
   add("norm.weight", {d}), add("norm.bias", {d});
@@ -47,16 +51,21 @@ bool ends_with(const std::string& text, const char* end) { return text.ends_with
 void check(const TransformerShape& shape) {
   if (shape.token_sizes.empty()) throw InputError("sampler: token_sizes: there are none");
   for (const int64_t size : shape.token_sizes) {
-    if (size < 1) throw InputError("sampler: token_sizes: " + std::to_string(size) + " is no length");
+    if (size < 1)
+      throw InputError("sampler: token_sizes: " + std::to_string(size) + " is no length");
   }
-  const std::pair<const char*, int64_t> sizes[] = {
-      {"d_model", shape.d_model}, {"blocks", shape.blocks}, {"heads", shape.heads}, {"feed_forward", shape.feed_forward}};
+  const std::pair<const char*, int64_t> sizes[] = {{"d_model", shape.d_model},
+                                                   {"blocks", shape.blocks},
+                                                   {"heads", shape.heads},
+                                                   {"feed_forward", shape.feed_forward}};
   for (const auto& [name, value] : sizes) {
-    if (value < 1) throw InputError("sampler: " + std::string(name) + ": " + std::to_string(value) + " is not positive");
+    if (value < 1)
+      throw InputError("sampler: " + std::string(name) + ": " + std::to_string(value) +
+                       " is not positive");
   }
   if (shape.d_model % (2 * shape.heads) != 0) {
-    throw InputError("sampler: d_model: " + std::to_string(shape.d_model) + " is no multiple of twice the " + std::to_string(shape.heads) +
-                     " heads");
+    throw InputError("sampler: d_model: " + std::to_string(shape.d_model) +
+                     " is no multiple of twice the " + std::to_string(shape.heads) + " heads");
   }
 }
 
@@ -72,8 +81,10 @@ TransformerShape shape_from_json(const nlohmann::json& json, const std::string& 
   TransformerShape shape;
   try {
     shape.token_sizes = json.at("token_sizes").get<std::vector<int64_t>>();
-    shape.d_model = json.at("d_model").get<int64_t>(), shape.blocks = json.at("blocks").get<int64_t>();
-    shape.heads = json.at("heads").get<int64_t>(), shape.feed_forward = json.at("feed_forward").get<int64_t>();
+    shape.d_model = json.at("d_model").get<int64_t>(),
+    shape.blocks = json.at("blocks").get<int64_t>();
+    shape.heads = json.at("heads").get<int64_t>(),
+    shape.feed_forward = json.at("feed_forward").get<int64_t>();
   } catch (const nlohmann::json::exception& error) {
     throw InputError(where + ": " + error.what());
   }
@@ -81,13 +92,16 @@ TransformerShape shape_from_json(const nlohmann::json& json, const std::string& 
   return shape;
 }
 
-uint64_t parameter_count(const TransformerShape& shape) { return static_cast<uint64_t>(layout_of(shape).count()); }
+uint64_t parameter_count(const TransformerShape& shape) {
+  return static_cast<uint64_t>(layout_of(shape).count());
+}
 
 uint64_t mac_count(const TransformerShape& shape) {
   const auto d = static_cast<uint64_t>(shape.d_model), tokens = shape.token_sizes.size() + 1;
   uint64_t values = 0;
   for (const int64_t size : shape.token_sizes) values += static_cast<uint64_t>(size);
-  const uint64_t token = 4 * d * d + 2 * d * static_cast<uint64_t>(shape.feed_forward) + 2 * tokens * d;
+  const uint64_t token =
+      4 * d * d + 2 * d * static_cast<uint64_t>(shape.feed_forward) + 2 * tokens * d;
   return 2 * values * d + 2 * d * d + static_cast<uint64_t>(shape.blocks) * tokens * token;
 }
 
@@ -115,7 +129,9 @@ struct Transformer::Impl {
     torch::Tensor linear(const torch::Tensor& x) {
       const torch::Tensor &weight = next(), &bias = next();
       if (!bf16) return torch::linear(x, weight, bias);
-      return torch::linear(x.to(torch::kBFloat16), weight.to(torch::kBFloat16)).to(torch::kFloat32) + bias;
+      return torch::linear(x.to(torch::kBFloat16), weight.to(torch::kBFloat16))
+                 .to(torch::kFloat32) +
+             bias;
     }
     torch::Tensor norm(const torch::Tensor& x) {
       const torch::Tensor &weight = next(), &bias = next();
@@ -125,8 +141,12 @@ struct Transformer::Impl {
 
   torch::Tensor attention(Reader& reader, const torch::Tensor& t) const {
     const int64_t batch = t.size(0), tokens = t.size(1), width = shape.d_model / shape.heads;
-    const auto qkv = reader.linear(t).view({batch, tokens, 3, shape.heads, width}).permute({2, 0, 3, 1, 4}).unbind(0);
-    const torch::Tensor scores = torch::matmul(qkv[0], qkv[1].transpose(-2, -1)) * (1 / std::sqrt(static_cast<double>(width)));
+    const auto qkv = reader.linear(t)
+                         .view({batch, tokens, 3, shape.heads, width})
+                         .permute({2, 0, 3, 1, 4})
+                         .unbind(0);
+    const torch::Tensor scores = torch::matmul(qkv[0], qkv[1].transpose(-2, -1)) *
+                                 (1 / std::sqrt(static_cast<double>(width)));
     const torch::Tensor mixed = torch::matmul(torch::softmax(scores, -1), qkv[2]);
     return reader.linear(mixed.transpose(1, 2).reshape({batch, tokens, shape.d_model}));
   }
@@ -134,7 +154,8 @@ struct Transformer::Impl {
   torch::Tensor forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16) const {
     Reader reader{*this, 0, bf16};
     std::vector<torch::Tensor> tokens{torch::Tensor()};
-    for (const torch::Tensor& part : z.split_with_sizes(splits, 1)) tokens.push_back(reader.linear(part));
+    for (const torch::Tensor& part : z.split_with_sizes(splits, 1))
+      tokens.push_back(reader.linear(part));
     const torch::Tensor position = reader.next();
     tokens[0] = reader.linear(embed_lambda(lambda, shape.d_model));
     tokens[0] = reader.linear(torch::silu(tokens[0]));
@@ -147,7 +168,8 @@ struct Transformer::Impl {
     }
     t = reader.norm(t);
     std::vector<torch::Tensor> out;
-    for (size_t l = 0; l < splits.size(); ++l) out.push_back(reader.linear(t.select(1, static_cast<int64_t>(l) + 1)));
+    for (size_t l = 0; l < splits.size(); ++l)
+      out.push_back(reader.linear(t.select(1, static_cast<int64_t>(l) + 1)));
     return torch::cat(out, 1);
   }
 };
@@ -167,7 +189,8 @@ Transformer::Transformer(const TransformerShape& shape, uint64_t seed) {
     } else if (name == "position") {
       values.normal_(0, kPositionDeviation, generator);
     } else if (!name.starts_with("unproj")) {
-      if (ends_with(name, "weight")) bound = 1 / std::sqrt(static_cast<double>(list[i].shape.back()));
+      if (ends_with(name, "weight"))
+        bound = 1 / std::sqrt(static_cast<double>(list[i].shape.back()));
       values.uniform_(-bound, bound, generator);
     }
   }
@@ -175,7 +198,8 @@ Transformer::Transformer(const TransformerShape& shape, uint64_t seed) {
 
 Transformer::~Transformer() = default;
 
-torch::Tensor Transformer::forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16) const {
+torch::Tensor Transformer::forward(const torch::Tensor& z, const torch::Tensor& lambda,
+                                   bool bf16) const {
   return impl_->forward(z, lambda, bf16);
 }
 torch::Tensor& Transformer::weights() { return impl_->parameters.weights(); }

@@ -1,14 +1,15 @@
 // The transformer that predicts clean weights from noisy ones: the paper's second network.
 //
-//   t_l = Proj_l(z_l) + position_l          one linear layer a token, because tokens have different lengths
-//   t_time = MLP(sinusoids of lambda)       a token of its own, first (HyperDiffusion)
+//   t_l = Proj_l(z_l) + position_l          one linear layer a token, because tokens have different
+//   lengths t_time = MLP(sinusoids of lambda)       a token of its own, first (HyperDiffusion)
 //   blocks: t += Attention(LayerNorm(t));  t += W2 GELU(W1 LayerNorm(t))
 //   x_l = Unproj_l(LayerNorm(t_l))
 //
-// lambda = ln(alpha / sigma), half the log of the signal-to-noise ratio, is the only time there is: the network knows no number of steps.
-// All parameters live in one flat tensor (flat_parameters.h).
+// lambda = ln(alpha / sigma), half the log of the signal-to-noise ratio, is the only time there is:
+// the network knows no number of steps. All parameters live in one flat tensor (flat_parameters.h).
 //
-// Based on: the paper, section 4.2; Erkoc et al., HyperDiffusion, 2023; Radford et al., GPT-2, 2019 (pre-norm blocks).
+// Based on: the paper, section 4.2; Erkoc et al., HyperDiffusion, 2023; Radford et al., GPT-2, 2019
+// (pre-norm blocks).
 #pragma once
 
 #include <torch/torch.h>
@@ -31,7 +32,8 @@ struct TransformerShape {
   int64_t feed_forward = 2048;
 };
 
-// Throws InputError naming the field: nothing positive, heads that do not divide d_model, an odd d_model.
+// Throws InputError naming the field: nothing positive, heads that do not divide d_model, an odd
+// d_model.
 void check(const TransformerShape& shape);
 nlohmann::json to_json(const TransformerShape& shape);
 TransformerShape shape_from_json(const nlohmann::json& json, const std::string& where);
@@ -42,16 +44,18 @@ uint64_t mac_count(const TransformerShape& shape);
 
 class Transformer {
  public:
-  // Weights from the seed: linear layers uniform in +-1/sqrt(inputs), positions normal of deviation 0.02, Unproj zero, so that the first
-  // prediction is the mean of the training members.
+  // Weights from the seed: linear layers uniform in +-1/sqrt(inputs), positions normal of deviation
+  // 0.02, Unproj zero, so that the first prediction is the mean of the training members.
   Transformer(const TransformerShape& shape, uint64_t seed);
   ~Transformer();
   Transformer(const Transformer&) = delete;
   Transformer& operator=(const Transformer&) = delete;
 
-  // z: [B,D] noisy values; lambda: [B], finite. Returns the predicted clean values [B,D], differentiable by the weights. bf16: matrix
-  // products in bfloat16, sums, norms and results in float.
-  torch::Tensor forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16 = false) const;
+  // z: [B,D] noisy values; lambda: [B], finite. Returns the predicted clean values [B,D],
+  // differentiable by the weights. bf16: matrix products in bfloat16, sums, norms and results in
+  // float.
+  torch::Tensor forward(const torch::Tensor& z, const torch::Tensor& lambda,
+                        bool bf16 = false) const;
 
   torch::Tensor& weights();    // [P] flat; assign into it in place only
   torch::Tensor& gradients();  // [P] flat; backward passes add to it
@@ -63,8 +67,9 @@ class Transformer {
   std::unique_ptr<Impl> impl_;
 };
 
-// [B] to [B,width]: sines, then cosines, of lambda times width / 2 frequencies, geometric from 1/20 to 20 radians a unit: the slowest turns
-// once over every range in use, the fastest tells steps apart that are a hundredth of it.
+// [B] to [B,width]: sines, then cosines, of lambda times width / 2 frequencies, geometric from 1/20
+// to 20 radians a unit: the slowest turns once over every range in use, the fastest tells steps
+// apart that are a hundredth of it.
 torch::Tensor embed_lambda(const torch::Tensor& lambda, int64_t width);
 
 }  // namespace figurine::generate

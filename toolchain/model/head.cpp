@@ -37,7 +37,8 @@ struct Decoded {
   bool scale_clamped[3];
 };
 
-// The unit quaternion of (1,0,0,0) + h; the identity where figurine::rotation_from_quaternion gives it.
+// The unit quaternion of (1,0,0,0) + h; the identity where figurine::rotation_from_quaternion gives
+// it.
 template <class Scalar>
 void unit_quaternion(const Scalar* h, Scalar* unit, Scalar& inverse_length) {
   const Scalar raw[4] = {1 + h[0], h[1], h[2], h[3]};
@@ -54,7 +55,8 @@ void unit_quaternion(const Scalar* h, Scalar* unit, Scalar& inverse_length) {
   }
   Scalar scaled[4];
   for (int k = 0; k < 4; ++k) scaled[k] = raw[k] / largest;
-  const Scalar inverse = 1 / std::sqrt(scaled[0] * scaled[0] + scaled[1] * scaled[1] + scaled[2] * scaled[2] + scaled[3] * scaled[3]);
+  const Scalar inverse = 1 / std::sqrt(scaled[0] * scaled[0] + scaled[1] * scaled[1] +
+                                       scaled[2] * scaled[2] + scaled[3] * scaled[3]);
   for (int k = 0; k < 4; ++k) unit[k] = scaled[k] * inverse;
   inverse_length = inverse / largest;
 }
@@ -84,14 +86,18 @@ void decode_texel(const HeadFrame& frame, uint32_t texel, const Scalar* h, Decod
   Scalar rotation[9];
   rotation_matrix(out.quaternion, rotation);
   const Scalar limit = Scalar(frame.decoding.max_log_scale);
-  const Scalar base = Scalar(frame.decoding.spacing_scale) * Scalar(frame.body->texel_spacing_m[texel]);
+  const Scalar base =
+      Scalar(frame.decoding.spacing_scale) * Scalar(frame.body->texel_spacing_m[texel]);
   for (int j = 0; j < 3; ++j) {
     const Scalar log_scale = h[3 + j];
     out.scale_clamped[j] = !(log_scale >= -limit && log_scale <= limit);
-    out.scale[j] = base * std::exp(log_scale < -limit ? -limit : log_scale > limit ? limit : log_scale);
+    out.scale[j] = base * std::exp(log_scale < -limit  ? -limit
+                                   : log_scale > limit ? limit
+                                                       : log_scale);
     for (int i = 0; i < 3; ++i) {
       const Scalar* row = &out.blended[4 * i];
-      out.rotated[3 * i + j] = row[0] * rotation[j] + row[1] * rotation[3 + j] + row[2] * rotation[6 + j];
+      out.rotated[3 * i + j] =
+          row[0] * rotation[j] + row[1] * rotation[3 + j] + row[2] * rotation[6 + j];
     }
   }
 }
@@ -102,9 +108,11 @@ Scalar sigmoid(Scalar x) {
 }
 
 void check(const HeadFrame& frame) {
-  FIG_CHECK(frame.body != nullptr && frame.texel_position_m.size() == frame.body->texel_position_m.size(),
-            "one canonical position per texel");
-  FIG_CHECK(frame.world_from_rest.size() == frame.body->joint_count(), "one skinning transform per joint");
+  FIG_CHECK(
+      frame.body != nullptr && frame.texel_position_m.size() == frame.body->texel_position_m.size(),
+      "one canonical position per texel");
+  FIG_CHECK(frame.world_from_rest.size() == frame.body->joint_count(),
+            "one skinning transform per joint");
   FIG_CHECK(frame.decoding.sh_degree <= kMaxShDegree, "SH degree");
 }
 
@@ -121,9 +129,11 @@ void GaussianBuffer<Scalar>::resize(uint32_t gaussians, uint32_t degree) {
 }
 
 template <class Scalar>
-void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads, GaussianBuffer<Scalar>& gaussians) {
+void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads,
+                 GaussianBuffer<Scalar>& gaussians) {
   check(frame);
-  const uint32_t count = frame.body->texel_count(), channels = head_channels(frame.decoding.sh_degree), sh_values = channels - 11;
+  const uint32_t count = frame.body->texel_count(),
+                 channels = head_channels(frame.decoding.sh_degree), sh_values = channels - 11;
   gaussians.resize(count, frame.decoding.sh_degree);
   parallel_for(threads, (count + kChunk - 1) / kChunk, [&](uint32_t chunk) {
     for (uint32_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
@@ -132,11 +142,15 @@ void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads, G
       decode_texel(frame, i, h, decoded);
       Scalar canonical[3];
       for (int k = 0; k < 3; ++k)
-        canonical[k] = Scalar(frame.texel_position_m[3 * size_t(i) + k]) + Scalar(frame.decoding.offset_scale_m) * h[k];
+        canonical[k] = Scalar(frame.texel_position_m[3 * size_t(i) + k]) +
+                       Scalar(frame.decoding.offset_scale_m) * h[k];
       for (int r = 0; r < 3; ++r) {
         const Scalar* row = &decoded.blended[4 * r];
-        gaussians.position_m[3 * size_t(i) + r] = (row[0] * canonical[0] + row[1] * canonical[1]) + (row[2] * canonical[2] + row[3]);
-        for (int j = 0; j < 3; ++j) gaussians.covariance_factor[9 * size_t(i) + 3 * r + j] = decoded.rotated[3 * r + j] * decoded.scale[j];
+        gaussians.position_m[3 * size_t(i) + r] =
+            (row[0] * canonical[0] + row[1] * canonical[1]) + (row[2] * canonical[2] + row[3]);
+        for (int j = 0; j < 3; ++j)
+          gaussians.covariance_factor[9 * size_t(i) + 3 * r + j] =
+              decoded.rotated[3 * r + j] * decoded.scale[j];
       }
       gaussians.opacity[i] = sigmoid(h[10] + Scalar(frame.decoding.opacity_bias));
       std::copy_n(h + 11, sh_values, &gaussians.sh[size_t(i) * sh_values]);
@@ -145,11 +159,14 @@ void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads, G
 }
 
 template <class Scalar>
-void decode_head_backward(const HeadFrame& frame, const Scalar* head, const GaussianBuffer<Scalar>& gradients, uint32_t threads,
+void decode_head_backward(const HeadFrame& frame, const Scalar* head,
+                          const GaussianBuffer<Scalar>& gradients, uint32_t threads,
                           Scalar* head_gradient) {
   check(frame);
-  const uint32_t count = frame.body->texel_count(), channels = head_channels(frame.decoding.sh_degree), sh_values = channels - 11;
-  FIG_CHECK(gradients.count == count && gradients.sh_degree == frame.decoding.sh_degree, "gradients of these Gaussians");
+  const uint32_t count = frame.body->texel_count(),
+                 channels = head_channels(frame.decoding.sh_degree), sh_values = channels - 11;
+  FIG_CHECK(gradients.count == count && gradients.sh_degree == frame.decoding.sh_degree,
+            "gradients of these Gaussians");
   const uint32_t size = frame.body->uv_size;
   std::fill_n(head_gradient, size_t(size) * size * channels, Scalar(0));
   parallel_for(threads, (count + kChunk - 1) / kChunk, [&](uint32_t chunk) {
@@ -157,9 +174,11 @@ void decode_head_backward(const HeadFrame& frame, const Scalar* head, const Gaus
       const Scalar* const dp = &gradients.position_m[3 * size_t(i)];
       const Scalar* const df = &gradients.covariance_factor[9 * size_t(i)];
       const Scalar* const dsh = &gradients.sh[size_t(i) * sh_values];
-      // Most Gaussians of a view are hidden: their gradients are exactly zero, and so are the outputs' (also where an output is not
-      // finite).
-      const auto zero = [](const Scalar* values, size_t n) { return std::all_of(values, values + n, [](Scalar v) { return v == 0; }); };
+      // Most Gaussians of a view are hidden: their gradients are exactly zero, and so are the
+      // outputs' (also where an output is not finite).
+      const auto zero = [](const Scalar* values, size_t n) {
+        return std::all_of(values, values + n, [](Scalar v) { return v == 0; });
+      };
       if (zero(dp, 3) && zero(df, 9) && gradients.opacity[i] == 0 && zero(dsh, sh_values)) continue;
       const Scalar* h = head + size_t(frame.body->texel[i]) * channels;
       Scalar* const dh = head_gradient + size_t(frame.body->texel[i]) * channels;
@@ -167,20 +186,26 @@ void decode_head_backward(const HeadFrame& frame, const Scalar* head, const Gaus
       decode_texel(frame, i, h, at);
       const Scalar* m = at.blended;
       // p = A (x + offset_scale h) + t
-      for (int k = 0; k < 3; ++k) dh[k] = Scalar(frame.decoding.offset_scale_m) * (m[k] * dp[0] + m[4 + k] * dp[1] + m[8 + k] * dp[2]);
+      for (int k = 0; k < 3; ++k)
+        dh[k] = Scalar(frame.decoding.offset_scale_m) *
+                (m[k] * dp[0] + m[4 + k] * dp[1] + m[8 + k] * dp[2]);
       // F = (A R) S: dS_j = sum_i dF_ij (AR)_ij; dR = A^T dF S
       Scalar d_rotation[9];
       for (int j = 0; j < 3; ++j) {
-        const Scalar d_scale = df[j] * at.rotated[j] + df[3 + j] * at.rotated[3 + j] + df[6 + j] * at.rotated[6 + j];
+        const Scalar d_scale =
+            df[j] * at.rotated[j] + df[3 + j] * at.rotated[3 + j] + df[6 + j] * at.rotated[6 + j];
         dh[3 + j] = at.scale_clamped[j] ? Scalar(0) : d_scale * at.scale[j];
-        for (int k = 0; k < 3; ++k) d_rotation[3 * k + j] = at.scale[j] * (m[k] * df[j] + m[4 + k] * df[3 + j] + m[8 + k] * df[6 + j]);
+        for (int k = 0; k < 3; ++k)
+          d_rotation[3 * k + j] =
+              at.scale[j] * (m[k] * df[j] + m[4 + k] * df[3 + j] + m[8 + k] * df[6 + j]);
       }
       // q = raw / |raw|: only the part across q turns it.
       Scalar d_unit[4];
       rotation_matrix_backward(at.quaternion, d_rotation, d_unit);
       Scalar along = 0;
       for (int k = 0; k < 4; ++k) along += d_unit[k] * at.quaternion[k];
-      for (int k = 0; k < 4; ++k) dh[6 + k] = at.inverse_length * (d_unit[k] - along * at.quaternion[k]);
+      for (int k = 0; k < 4; ++k)
+        dh[6 + k] = at.inverse_length * (d_unit[k] - along * at.quaternion[k]);
       const Scalar opacity = sigmoid(h[10] + Scalar(frame.decoding.opacity_bias));
       dh[10] = gradients.opacity[i] * opacity * (1 - opacity);
       std::copy_n(dsh, sh_values, dh + 11);
@@ -192,7 +217,9 @@ template struct GaussianBuffer<float>;
 template struct GaussianBuffer<double>;
 template void decode_head(const HeadFrame&, const float*, uint32_t, GaussianBuffer<float>&);
 template void decode_head(const HeadFrame&, const double*, uint32_t, GaussianBuffer<double>&);
-template void decode_head_backward(const HeadFrame&, const float*, const GaussianBuffer<float>&, uint32_t, float*);
-template void decode_head_backward(const HeadFrame&, const double*, const GaussianBuffer<double>&, uint32_t, double*);
+template void decode_head_backward(const HeadFrame&, const float*, const GaussianBuffer<float>&,
+                                   uint32_t, float*);
+template void decode_head_backward(const HeadFrame&, const double*, const GaussianBuffer<double>&,
+                                   uint32_t, double*);
 
 }  // namespace figurine::model

@@ -1,8 +1,9 @@
-// The Gaussian head: raw network outputs per texel to world-space Gaussians, and the analytic gradient back (HeadDecoding in
-// figurine/avatar.h).
+// The Gaussian head: raw network outputs per texel to world-space Gaussians, and the analytic
+// gradient back (HeadDecoding in figurine/avatar.h).
 //
-// Only covered texels become Gaussians; all other outputs have gradient zero. Instantiated for float (training) and double
-// (finite-difference checks). In float it does the same operations in the same order as the runtime's decoding.
+// Only covered texels become Gaussians; all other outputs have gradient zero. Instantiated for
+// float (training) and double (finite-difference checks). In float it does the same operations in
+// the same order as the runtime's decoding.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +19,9 @@ namespace figurine::model {
 
 // What one frame's decoding needs beside the head output. Borrowed.
 struct HeadFrame {
-  const Body* body = nullptr;               // texel, texel_joints, texel_weights, texel_spacing_m are read
-  std::span<const float> texel_position_m;  // [N,3] canonical: the person's own (shape_body) or body->texel_position_m
+  const Body* body = nullptr;  // texel, texel_joints, texel_weights, texel_spacing_m are read
+  std::span<const float>
+      texel_position_m;  // [N,3] canonical: the person's own (shape_body) or body->texel_position_m
   std::span<const Affine> world_from_rest;  // [J] skinning transforms of the same template's joints
   HeadDecoding decoding;
 };
@@ -32,17 +34,25 @@ struct GaussianBuffer {
   uint32_t sh_degree = 0;
 
   void resize(uint32_t gaussians, uint32_t degree);
-  GaussianArrays<Scalar> view() const { return {count, sh_degree, position_m.data(), covariance_factor.data(), opacity.data(), sh.data()}; }
-  GaussianGradients<Scalar> gradients() { return {position_m.data(), covariance_factor.data(), opacity.data(), sh.data()}; }
+  GaussianArrays<Scalar> view() const {
+    return {count,          sh_degree, position_m.data(), covariance_factor.data(),
+            opacity.data(), sh.data()};
+  }
+  GaussianGradients<Scalar> gradients() {
+    return {position_m.data(), covariance_factor.data(), opacity.data(), sh.data()};
+  }
 };
 
 // head: [T,T,head_channels(sh_degree)] raw outputs.
 template <class Scalar>
-void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads, GaussianBuffer<Scalar>& gaussians);
+void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads,
+                 GaussianBuffer<Scalar>& gaussians);
 
-// gradients: dL/dGaussians of decode_head's result. head_gradient: [T,T,channels], all of it is written.
+// gradients: dL/dGaussians of decode_head's result. head_gradient: [T,T,channels], all of it is
+// written.
 template <class Scalar>
-void decode_head_backward(const HeadFrame& frame, const Scalar* head, const GaussianBuffer<Scalar>& gradients, uint32_t threads,
+void decode_head_backward(const HeadFrame& frame, const Scalar* head,
+                          const GaussianBuffer<Scalar>& gradients, uint32_t threads,
                           Scalar* head_gradient);
 
 extern template struct GaussianBuffer<float>;

@@ -1,4 +1,5 @@
-// The kernels of splatter and SSIM for the baseline instruction set; also in double, for the finite-difference checks.
+// The kernels of splatter and SSIM for the baseline instruction set; also in double, for the
+// finite-difference checks.
 #include "toolchain/model/splat_kernels.h"
 #include "toolchain/model/ssim_kernels.h"
 

@@ -1,7 +1,8 @@
-// The first stage's image loss: L1 + SSIM (ssim.h) + mask, forward and analytic backward fused in threaded C++.
+// The first stage's image loss: L1 + SSIM (ssim.h) + mask, forward and analytic backward fused in
+// threaded C++.
 //
-// Weights are the paper's, 1.0 / 0.1 / 0.1, for L1, 1 - SSIM and L1 of the mask; its LPIPS term (0.01) is left out: no pretrained AlexNet
-// can be had from the platform's packages.
+// Weights are the paper's, 1.0 / 0.1 / 0.1, for L1, 1 - SSIM and L1 of the mask; its LPIPS term
+// (0.01) is left out: no pretrained AlexNet can be had from the platform's packages.
 #pragma once
 
 #include <torch/torch.h>
@@ -27,9 +28,11 @@ struct LossTerms {
   uint64_t foreground = 0;   // number of those pixels
 };
 
-// image: [4,h,w] premultiplied R, G, B and alpha (AvatarRenderer); target: the same of the truth, alpha = mask. Both are seen over
-// `background`: colour + (1 - alpha) background. Returns the scalar loss, differentiable by image; terms (may be null) are filled at once.
-torch::Tensor image_loss(const torch::Tensor& image, const torch::Tensor& target, const std::array<float, 3>& background,
-                         const LossOptions& options, LossTerms* terms);
+// image: [4,h,w] premultiplied R, G, B and alpha (AvatarRenderer); target: the same of the truth,
+// alpha = mask. Both are seen over `background`: colour + (1 - alpha) background. Returns the
+// scalar loss, differentiable by image; terms (may be null) are filled at once.
+torch::Tensor image_loss(const torch::Tensor& image, const torch::Tensor& target,
+                         const std::array<float, 3>& background, const LossOptions& options,
+                         LossTerms* terms);
 
 }  // namespace figurine::model

@@ -4,7 +4,8 @@ namespace figurine::model {
 
 namespace {
 
-// Steepest at zero among the quintics whose iteration stays near 1 (Jordan et al.): it does not converge to 1, which training does not ask.
+// Steepest at zero among the quintics whose iteration stays near 1 (Jordan et al.): it does not
+// converge to 1, which training does not ask.
 constexpr double kA = 3.4445, kB = -4.7750, kC = 2.0315;
 constexpr int kIterations = 5;
 

@@ -6,7 +6,8 @@
 
 namespace figurine::model {
 
-void parallel_tasks(uint32_t threads, uint32_t tasks, void (*run)(void* context, uint32_t task), void* context) {
+void parallel_tasks(uint32_t threads, uint32_t tasks, void (*run)(void* context, uint32_t task),
+                    void* context) {
   const uint32_t used = std::min(threads, tasks);
   if (used <= 1 || omp_in_parallel()) {
     for (uint32_t task = 0; task < tasks; ++task) run(context, task);

@@ -1,9 +1,9 @@
-// Work spread over the threads that LibTorch itself uses (OpenMP), so that the trainer has one set of threads and no two pools fight for
-// two cores.
+// Work spread over the threads that LibTorch itself uses (OpenMP), so that the trainer has one set
+// of threads and no two pools fight for two cores.
 //
-// Tasks are handed out one by one (whoever is free takes the next), so uneven tasks balance. A task must not depend on which thread runs
-// it: everything in this folder writes per-task results and reduces them in task order, so that results do not depend on the number of
-// threads.
+// Tasks are handed out one by one (whoever is free takes the next), so uneven tasks balance. A task
+// must not depend on which thread runs it: everything in this folder writes per-task results and
+// reduces them in task order, so that results do not depend on the number of threads.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,10 @@
 
 namespace figurine::model {
 
-// Calls run(context, task) for every task in [0, tasks) on at most `threads` threads, the caller's included; returns when all are done.
-void parallel_tasks(uint32_t threads, uint32_t tasks, void (*run)(void* context, uint32_t task), void* context);
+// Calls run(context, task) for every task in [0, tasks) on at most `threads` threads, the caller's
+// included; returns when all are done.
+void parallel_tasks(uint32_t threads, uint32_t tasks, void (*run)(void* context, uint32_t task),
+                    void* context);
 
 template <class Body>
 void parallel_for(uint32_t threads, uint32_t tasks, Body&& body) {

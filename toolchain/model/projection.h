@@ -1,7 +1,9 @@
-// One Gaussian through one camera and back: EWA projection, colour from spherical harmonics, and the analytic gradient of both.
+// One Gaussian through one camera and back: EWA projection, colour from spherical harmonics, and
+// the analytic gradient of both.
 //
-// Equations and letters are those of docs/numerics.md, "Splatting": view point v, tangents (tx, ty) clamped in the Jacobian only, G = R F,
-// rows u and v of the projected 2x3 factor, a = u.u + e, b = u.v, c = v.v + e, determinant by Cauchy-Binet. The blend's parameters are
+// Equations and letters are those of docs/numerics.md, "Splatting": view point v, tangents (tx, ty)
+// clamped in the Jacobian only, G = R F, rows u and v of the projected 2x3 factor, a = u.u + e, b =
+// u.v, c = v.v + e, determinant by Cauchy-Binet. The blend's parameters are
 //   power = -(P (dx - K dy)^2 + Q dy^2),   P = c / (2 det), K = b / c, Q = 1 / (2 c).
 // Based on: Zwicker et al., EWA Splatting, 2002, eq. 22-31.
 #pragma once
@@ -19,7 +21,7 @@ struct ProjectionCamera {
   Scalar rotation[9], translation[3], centre[3];  // centre: the camera's, in the world
   Scalar fx, fy, cx, cy;
   Scalar tangent_low[2], tangent_high[2];  // clamp of the Jacobian's x/z and y/z
-  float depth_row[4];                      // the depth key is float arithmetic in every instantiation
+  float depth_row[4];  // the depth key is float arithmetic in every instantiation
   float near;
 
   explicit ProjectionCamera(const Camera& camera) {
@@ -29,11 +31,13 @@ struct ProjectionCamera {
       translation[r] = m[4 * r + 3];
     }
     for (int k = 0; k < 3; ++k) {
-      centre[k] = -(rotation[k] * translation[0] + rotation[3 + k] * translation[1] + rotation[6 + k] * translation[2]);
+      centre[k] = -(rotation[k] * translation[0] + rotation[3 + k] * translation[1] +
+                    rotation[6 + k] * translation[2]);
     }
     for (int k = 0; k < 4; ++k) depth_row[k] = m[8 + k];
     fx = camera.fx_px, fy = camera.fy_px, cx = camera.cx_px, cy = camera.cy_px;
-    const Scalar margin = Scalar(0.5) * (Scalar(kFrustumClamp) - 1), w = Scalar(camera.width_px), h = Scalar(camera.height_px);
+    const Scalar margin = Scalar(0.5) * (Scalar(kFrustumClamp) - 1), w = Scalar(camera.width_px),
+                 h = Scalar(camera.height_px);
     tangent_low[0] = -(cx + margin * w) / fx, tangent_high[0] = (w - cx + margin * w) / fx;
     tangent_low[1] = -(cy + margin * h) / fy, tangent_high[1] = (h - cy + margin * h) / fy;
     near = camera.near_m;
@@ -51,9 +55,11 @@ struct Projected {
   Scalar mean[2], a, b, c, determinant;
 };
 
-// Real spherical harmonics of the unit direction, and optionally the derivatives by x, y, z as if they were independent.
+// Real spherical harmonics of the unit direction, and optionally the derivatives by x, y, z as if
+// they were independent.
 template <class Scalar>
-void sh_basis(uint32_t degree, Scalar x, Scalar y, Scalar z, Scalar* basis, Scalar (*derivative)[3]) {
+void sh_basis(uint32_t degree, Scalar x, Scalar y, Scalar z, Scalar* basis,
+              Scalar (*derivative)[3]) {
   const auto set = [&](int i, Scalar value, Scalar dx, Scalar dy, Scalar dz) {
     basis[i] = value;
     if (derivative) derivative[i][0] = dx, derivative[i][1] = dy, derivative[i][2] = dz;
@@ -66,7 +72,8 @@ void sh_basis(uint32_t degree, Scalar x, Scalar y, Scalar z, Scalar* basis, Scal
   set(3, -c1 * x, -c1, 0, 0);
   if (degree < 2) return;
   const Scalar xx = x * x, yy = y * y, zz = z * z, xy = x * y, yz = y * z, xz = x * z;
-  const Scalar c2[5] = {Scalar(kSh2[0]), Scalar(kSh2[1]), Scalar(kSh2[2]), Scalar(kSh2[3]), Scalar(kSh2[4])};
+  const Scalar c2[5] = {Scalar(kSh2[0]), Scalar(kSh2[1]), Scalar(kSh2[2]), Scalar(kSh2[3]),
+                        Scalar(kSh2[4])};
   set(4, c2[0] * xy, c2[0] * y, c2[0] * x, 0);
   set(5, c2[1] * yz, 0, c2[1] * z, c2[1] * y);
   set(6, c2[2] * (2 * zz - xx - yy), -2 * c2[2] * x, -2 * c2[2] * y, 4 * c2[2] * z);
@@ -77,24 +84,31 @@ void sh_basis(uint32_t degree, Scalar x, Scalar y, Scalar z, Scalar* basis, Scal
                         Scalar(kSh3[4]), Scalar(kSh3[5]), Scalar(kSh3[6])};
   set(9, c3[0] * y * (3 * xx - yy), c3[0] * 6 * xy, c3[0] * 3 * (xx - yy), 0);
   set(10, c3[1] * xy * z, c3[1] * yz, c3[1] * xz, c3[1] * xy);
-  set(11, c3[2] * y * (4 * zz - xx - yy), c3[2] * -2 * xy, c3[2] * (4 * zz - xx - 3 * yy), c3[2] * 8 * yz);
-  set(12, c3[3] * z * (2 * zz - 3 * xx - 3 * yy), c3[3] * -6 * xz, c3[3] * -6 * yz, c3[3] * (6 * zz - 3 * xx - 3 * yy));
-  set(13, c3[4] * x * (4 * zz - xx - yy), c3[4] * (4 * zz - 3 * xx - yy), c3[4] * -2 * xy, c3[4] * 8 * xz);
+  set(11, c3[2] * y * (4 * zz - xx - yy), c3[2] * -2 * xy, c3[2] * (4 * zz - xx - 3 * yy),
+      c3[2] * 8 * yz);
+  set(12, c3[3] * z * (2 * zz - 3 * xx - 3 * yy), c3[3] * -6 * xz, c3[3] * -6 * yz,
+      c3[3] * (6 * zz - 3 * xx - 3 * yy));
+  set(13, c3[4] * x * (4 * zz - xx - yy), c3[4] * (4 * zz - 3 * xx - yy), c3[4] * -2 * xy,
+      c3[4] * 8 * xz);
   set(14, c3[5] * z * (xx - yy), c3[5] * 2 * xz, c3[5] * -2 * yz, c3[5] * (xx - yy));
   set(15, c3[6] * x * (xx - 3 * yy), c3[6] * 3 * (xx - yy), c3[6] * -6 * xy, 0);
 }
 
 // False if the Gaussian is left out: not in front of the near plane, or something is not finite.
 template <class Scalar>
-bool project(const ProjectionCamera<Scalar>& camera, const Scalar* position, const Scalar* factor, Projected<Scalar>& out) {
+bool project(const ProjectionCamera<Scalar>& camera, const Scalar* position, const Scalar* factor,
+             Projected<Scalar>& out) {
   const float px = float(position[0]), py = float(position[1]), pz = float(position[2]);
-  out.depth = (camera.depth_row[0] * px + camera.depth_row[1] * py) + (camera.depth_row[2] * pz + camera.depth_row[3]);
+  out.depth = (camera.depth_row[0] * px + camera.depth_row[1] * py) +
+              (camera.depth_row[2] * pz + camera.depth_row[3]);
   if (!(out.depth > camera.near) || !std::isfinite(out.depth)) return false;
   const Scalar* R = camera.rotation;
   for (int r = 0; r < 3; ++r) {
-    out.view[r] = (R[3 * r] * position[0] + R[3 * r + 1] * position[1]) + (R[3 * r + 2] * position[2] + camera.translation[r]);
+    out.view[r] = (R[3 * r] * position[0] + R[3 * r + 1] * position[1]) +
+                  (R[3 * r + 2] * position[2] + camera.translation[r]);
     for (int k = 0; k < 3; ++k) {
-      out.view_factor[3 * r + k] = R[3 * r] * factor[k] + R[3 * r + 1] * factor[3 + k] + R[3 * r + 2] * factor[6 + k];
+      out.view_factor[3 * r + k] =
+          R[3 * r] * factor[k] + R[3 * r + 1] * factor[3 + k] + R[3 * r + 2] * factor[6 + k];
     }
   }
   const Scalar inverse_z = 1 / out.view[2];
@@ -123,10 +137,11 @@ bool project(const ProjectionCamera<Scalar>& camera, const Scalar* position, con
   out.a = uu + e;
   out.b = uv;
   out.c = vv + e;
-  out.determinant =
-      (out.minors[0] * out.minors[0] + out.minors[1] * out.minors[1] + out.minors[2] * out.minors[2]) + (e * (uu + vv) + e * e);
-  return std::isfinite(out.determinant) && std::isfinite(out.a) && std::isfinite(out.b) && std::isfinite(out.c) &&
-         std::isfinite(out.mean[0]) && std::isfinite(out.mean[1]);
+  out.determinant = (out.minors[0] * out.minors[0] + out.minors[1] * out.minors[1] +
+                     out.minors[2] * out.minors[2]) +
+                    (e * (uu + vv) + e * e);
+  return std::isfinite(out.determinant) && std::isfinite(out.a) && std::isfinite(out.b) &&
+         std::isfinite(out.c) && std::isfinite(out.mean[0]) && std::isfinite(out.mean[1]);
 }
 
 // dL/d of mean, P, K and Q.
@@ -137,14 +152,16 @@ struct ProjectedGradient {
 
 // Gradient to position and factor (overwritten).
 template <class Scalar>
-void project_backward(const ProjectionCamera<Scalar>& camera, const Projected<Scalar>& at, const ProjectedGradient<Scalar>& gradient,
-                      Scalar* position_gradient, Scalar* factor_gradient) {
+void project_backward(const ProjectionCamera<Scalar>& camera, const Projected<Scalar>& at,
+                      const ProjectedGradient<Scalar>& gradient, Scalar* position_gradient,
+                      Scalar* factor_gradient) {
   const Scalar inverse_det = 1 / at.determinant, inverse_c = 1 / at.c;
   // P = c / (2 det), K = b / c, Q = 1 / (2 c)
   const Scalar d_det = -gradient.p * at.c * Scalar(0.5) * inverse_det * inverse_det;
   const Scalar d_b = gradient.k * inverse_c;
-  const Scalar d_c =
-      gradient.p * Scalar(0.5) * inverse_det - gradient.k * at.b * inverse_c * inverse_c - gradient.q * Scalar(0.5) * inverse_c * inverse_c;
+  const Scalar d_c = gradient.p * Scalar(0.5) * inverse_det -
+                     gradient.k * at.b * inverse_c * inverse_c -
+                     gradient.q * Scalar(0.5) * inverse_c * inverse_c;
   // det = n.n + e (u.u + v.v) + e^2 with n = u x v; b = u.v; c = v.v + e
   const Scalar *u = at.row_x, *v = at.row_y, *n = at.minors;
   const Scalar e = Scalar(kDilationPx2);
@@ -178,17 +195,21 @@ void project_backward(const ProjectionCamera<Scalar>& camera, const Projected<Sc
   const Scalar* R = camera.rotation;
   for (int k = 0; k < 3; ++k) {
     position_gradient[k] = R[k] * d_view[0] + R[3 + k] * d_view[1] + R[6 + k] * d_view[2];
-    for (int j = 0; j < 3; ++j) factor_gradient[3 * k + j] = R[k] * d_factor[j] + R[3 + k] * d_factor[3 + j] + R[6 + k] * d_factor[6 + j];
+    for (int j = 0; j < 3; ++j)
+      factor_gradient[3 * k + j] =
+          R[k] * d_factor[j] + R[3 + k] * d_factor[3 + j] + R[6 + k] * d_factor[6 + j];
   }
 }
 
 // colour = max(SH(direction) + 0.5, 0). False if a used coefficient is not finite.
 template <class Scalar>
-bool sh_colour(const ProjectionCamera<Scalar>& camera, uint32_t degree, const Scalar* position, const Scalar* sh, Scalar* rgb) {
+bool sh_colour(const ProjectionCamera<Scalar>& camera, uint32_t degree, const Scalar* position,
+               const Scalar* sh, Scalar* rgb) {
   Scalar basis[16], direction[3] = {0, 0, 1};
   if (degree > 0) {
     for (int k = 0; k < 3; ++k) direction[k] = position[k] - camera.centre[k];
-    const Scalar inverse = 1 / std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
+    const Scalar inverse = 1 / std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] +
+                                         direction[2] * direction[2]);
     for (Scalar& value : direction) value *= inverse;
   }
   sh_basis<Scalar>(degree, direction[0], direction[1], direction[2], basis, nullptr);
@@ -196,23 +217,30 @@ bool sh_colour(const ProjectionCamera<Scalar>& camera, uint32_t degree, const Sc
   for (uint32_t k = 0; k < sh_coefficients(degree); ++k) {
     for (int channel = 0; channel < 3; ++channel) sum[channel] += basis[k] * sh[3 * k + channel];
   }
-  for (int channel = 0; channel < 3; ++channel) rgb[channel] = sum[channel] > 0 ? sum[channel] : Scalar(0);
+  for (int channel = 0; channel < 3; ++channel)
+    rgb[channel] = sum[channel] > 0 ? sum[channel] : Scalar(0);
   return std::isfinite(sum[0]) && std::isfinite(sum[1]) && std::isfinite(sum[2]);
 }
 
-// Gradient to SH (overwritten) and, through the direction, to the position (added). A channel that was cut at 0 has no gradient.
+// Gradient to SH (overwritten) and, through the direction, to the position (added). A channel that
+// was cut at 0 has no gradient.
 template <class Scalar>
-void sh_colour_backward(const ProjectionCamera<Scalar>& camera, uint32_t degree, const Scalar* position, const Scalar* sh,
-                        const Scalar* rgb, const Scalar* rgb_gradient, Scalar* sh_gradient, Scalar* position_gradient) {
+void sh_colour_backward(const ProjectionCamera<Scalar>& camera, uint32_t degree,
+                        const Scalar* position, const Scalar* sh, const Scalar* rgb,
+                        const Scalar* rgb_gradient, Scalar* sh_gradient,
+                        Scalar* position_gradient) {
   Scalar basis[16], derivative[16][3], direction[3] = {0, 0, 1}, inverse = 0;
   if (degree > 0) {
     for (int k = 0; k < 3; ++k) direction[k] = position[k] - camera.centre[k];
-    inverse = 1 / std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
+    inverse = 1 / std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] +
+                            direction[2] * direction[2]);
     for (Scalar& value : direction) value *= inverse;
   }
-  sh_basis(degree, direction[0], direction[1], direction[2], basis, degree > 0 ? derivative : nullptr);
+  sh_basis(degree, direction[0], direction[1], direction[2], basis,
+           degree > 0 ? derivative : nullptr);
   Scalar gradient[3], d_direction[3] = {0, 0, 0};
-  for (int channel = 0; channel < 3; ++channel) gradient[channel] = rgb[channel] > 0 ? rgb_gradient[channel] : Scalar(0);
+  for (int channel = 0; channel < 3; ++channel)
+    gradient[channel] = rgb[channel] > 0 ? rgb_gradient[channel] : Scalar(0);
   for (uint32_t k = 0; k < sh_coefficients(degree); ++k) {
     Scalar along = 0;
     for (int channel = 0; channel < 3; ++channel) {
@@ -225,8 +253,10 @@ void sh_colour_backward(const ProjectionCamera<Scalar>& camera, uint32_t degree,
   }
   if (degree == 0) return;
   // direction = r / |r|: only the part across the ray moves it.
-  const Scalar radial = d_direction[0] * direction[0] + d_direction[1] * direction[1] + d_direction[2] * direction[2];
-  for (int k = 0; k < 3; ++k) position_gradient[k] += inverse * (d_direction[k] - radial * direction[k]);
+  const Scalar radial =
+      d_direction[0] * direction[0] + d_direction[1] * direction[1] + d_direction[2] * direction[2];
+  for (int k = 0; k < 3; ++k)
+    position_gradient[k] += inverse * (d_direction[k] - radial * direction[k]);
 }
 
 }  // namespace figurine::model

@@ -18,46 +18,58 @@ namespace {
 class Render : public torch::autograd::Function<Render> {
  public:
   static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::Tensor& head,
-                               const c10::intrusive_ptr<RendererState>& state, const RenderView& view) {
+                               const c10::intrusive_ptr<RendererState>& state,
+                               const RenderView& view) {
     torch::Tensor image = torch::empty({4, view.crop.height, view.crop.width});
-    decode_head(state->frame, head.const_data_ptr<float>(), state->options.threads, state->gaussians);
-    state->splatter.forward(state->gaussians.view(), view.camera, view.crop, image.mutable_data_ptr<float>());
+    decode_head(state->frame, head.const_data_ptr<float>(), state->options.threads,
+                state->gaussians);
+    state->splatter.forward(state->gaussians.view(), view.camera, view.crop,
+                            image.mutable_data_ptr<float>());
     context->save_for_backward({head, image});
     context->saved_data["state"] = c10::IValue::make_capsule(state);
     context->saved_data["render"] = ++state->renders;
     return image;
   }
 
-  static torch::autograd::tensor_list backward(torch::autograd::AutogradContext* context, torch::autograd::tensor_list output_gradients) {
-    const auto state = c10::static_intrusive_pointer_cast<RendererState>(context->saved_data["state"].toCapsule());
+  static torch::autograd::tensor_list backward(torch::autograd::AutogradContext* context,
+                                               torch::autograd::tensor_list output_gradients) {
+    const auto state =
+        c10::static_intrusive_pointer_cast<RendererState>(context->saved_data["state"].toCapsule());
     TORCH_CHECK(context->saved_data["render"].toInt() == state->renders,
                 "AvatarRenderer: the backward pass must be done before the next render");
     const torch::autograd::variable_list saved = context->get_saved_variables();
-    const torch::Tensor &head = saved[0], &image = saved[1], gradient = output_gradients[0].contiguous();
+    const torch::Tensor &head = saved[0], &image = saved[1],
+                        gradient = output_gradients[0].contiguous();
     torch::Tensor head_gradient = torch::empty_like(head);
     state->gradients.resize(state->gaussians.count, state->gaussians.sh_degree);
-    state->splatter.backward(image.const_data_ptr<float>(), gradient.const_data_ptr<float>(), state->gradients.gradients());
-    decode_head_backward(state->frame, head.const_data_ptr<float>(), state->gradients, state->options.threads,
-                         head_gradient.mutable_data_ptr<float>());
+    state->splatter.backward(image.const_data_ptr<float>(), gradient.const_data_ptr<float>(),
+                             state->gradients.gradients());
+    decode_head_backward(state->frame, head.const_data_ptr<float>(), state->gradients,
+                         state->options.threads, head_gradient.mutable_data_ptr<float>());
     return {head_gradient, {}, {}};
   }
 };
 
 }  // namespace
 
-AvatarRenderer::AvatarRenderer(const SplatterOptions& options) : state_(c10::make_intrusive<RendererState>(options)) {}
+AvatarRenderer::AvatarRenderer(const SplatterOptions& options)
+    : state_(c10::make_intrusive<RendererState>(options)) {}
 AvatarRenderer::~AvatarRenderer() = default;
 
-torch::Tensor AvatarRenderer::render(const torch::Tensor& head, const HeadFrame& frame, const RenderView& view) {
+torch::Tensor AvatarRenderer::render(const torch::Tensor& head, const HeadFrame& frame,
+                                     const RenderView& view) {
   const int64_t size = frame.body->uv_size, channels = head_channels(frame.decoding.sh_degree);
-  TORCH_CHECK(head.scalar_type() == torch::kFloat && head.is_contiguous(), "AvatarRenderer: the head must be contiguous floats");
-  TORCH_CHECK(head.sizes() == torch::IntArrayRef({size, size, channels}), "AvatarRenderer: the head must be [T,T,", channels,
-              "] with T = ", size);
+  TORCH_CHECK(head.scalar_type() == torch::kFloat && head.is_contiguous(),
+              "AvatarRenderer: the head must be contiguous floats");
+  TORCH_CHECK(head.sizes() == torch::IntArrayRef({size, size, channels}),
+              "AvatarRenderer: the head must be [T,T,", channels, "] with T = ", size);
   state_->frame = frame;
   return Render::apply(head, state_, view);
 }
 
 const GaussianBuffer<float>& AvatarRenderer::gaussians() const { return state_->gaussians; }
-const SplatterStatistics& AvatarRenderer::statistics() const { return state_->splatter.statistics(); }
+const SplatterStatistics& AvatarRenderer::statistics() const {
+  return state_->splatter.statistics();
+}
 
 }  // namespace figurine::model

@@ -1,4 +1,5 @@
-// The differentiable picture: head outputs to the RGBA crop of one camera, as one torch operation (decode, skin, splat; analytic backward).
+// The differentiable picture: head outputs to the RGBA crop of one camera, as one torch operation
+// (decode, skin, splat; analytic backward).
 #pragma once
 
 #include <torch/torch.h>
@@ -15,15 +16,16 @@ struct RenderView {
 
 struct RendererState;  // render.cpp
 
-// Renders with buffers that are reused from call to call. One AvatarRenderer serves one training loop: a call's backward must be done
-// before the next call.
+// Renders with buffers that are reused from call to call. One AvatarRenderer serves one training
+// loop: a call's backward must be done before the next call.
 class AvatarRenderer {
  public:
   explicit AvatarRenderer(const SplatterOptions& options);
   ~AvatarRenderer();
 
-  // head: [T,T,C] float, contiguous (PoseUNet::forward's result). Returns [4, crop.height, crop.width] float: premultiplied R, G, B and
-  // alpha. What `frame` borrows must live until the backward pass is done.
+  // head: [T,T,C] float, contiguous (PoseUNet::forward's result). Returns [4, crop.height,
+  // crop.width] float: premultiplied R, G, B and alpha. What `frame` borrows must live until the
+  // backward pass is done.
   torch::Tensor render(const torch::Tensor& head, const HeadFrame& frame, const RenderView& view);
 
   // The Gaussians of the last render().

@@ -1,7 +1,8 @@
-// The inner loops of the splatter: one tile of 32x32 pixels at a time, compiled once per instruction set (splat_kernels.inc).
+// The inner loops of the splatter: one tile of 32x32 pixels at a time, compiled once per
+// instruction set (splat_kernels.inc).
 //
-// Plain structs only: an inline function of a shared header that was compiled for AVX-512 could become the baseline build's copy at link
-// time.
+// Plain structs only: an inline function of a shared header that was compiled for AVX-512 could
+// become the baseline build's copy at link time.
 #pragma once
 
 #include <stdint.h>
@@ -14,8 +15,8 @@ inline constexpr uint32_t kTileBlocks = 64;  // bit 8 row + column of a mask
 inline constexpr uint32_t kBlockPixels = 16;
 inline constexpr uint32_t kPairSums = 9;
 
-// One projected Gaussian. alpha(x,y) = min(0.99, 2^(log2_opacity - (p t^2 + q dy^2))), t = dx - k dy: a sum of squares, so needles do not
-// cancel.
+// One projected Gaussian. alpha(x,y) = min(0.99, 2^(log2_opacity - (p t^2 + q dy^2))), t = dx - k
+// dy: a sum of squares, so needles do not cancel.
 template <class Scalar>
 struct SplatRecord {
   Scalar mean_x, mean_y;  // pixels, absolute in the image
@@ -27,11 +28,22 @@ struct SplatRecord {
 struct SplatPair {
   uint32_t gaussian;
   uint32_t unused;
-  uint64_t blocks;  // in: blocks that the ellipse touches; after forward_tile: those that it reached before they were full
+  uint64_t blocks;  // in: blocks that the ellipse touches; after forward_tile: those that it
+                    // reached before they were full
 };
 
 // Sums over pixels of one (Gaussian, tile) pair; s = alpha dL/dalpha = dL/dpower.
-enum PairSum : uint32_t { kSumS, kSumST, kSumSY, kSumSTT, kSumSTY, kSumSYY, kSumRed, kSumGreen, kSumBlue };
+enum PairSum : uint32_t {
+  kSumS,
+  kSumST,
+  kSumSY,
+  kSumSTT,
+  kSumSTY,
+  kSumSYY,
+  kSumRed,
+  kSumGreen,
+  kSumBlue
+};
 
 template <class Scalar>
 struct TileJob {
@@ -47,12 +59,15 @@ struct TileJob {
 
 template <class Scalar>
 struct SplatKernels {
-  // Fills pairs[].blocks. Conservative: a block that holds a pixel with alpha >= cut is never missed.
+  // Fills pairs[].blocks. Conservative: a block that holds a pixel with alpha >= cut is never
+  // missed.
   void (*find_blocks)(const TileJob<Scalar>& job);
-  // Blends the tile. image points at the tile's first pixel. Returns the number of block evaluations.
+  // Blends the tile. image points at the tile's first pixel. Returns the number of block
+  // evaluations.
   uint64_t (*forward_tile)(const TileJob<Scalar>& job, Scalar* image);
   // sums: [count, kPairSums].
-  void (*backward_tile)(const TileJob<Scalar>& job, const Scalar* image, const Scalar* image_gradient, Scalar* sums);
+  void (*backward_tile)(const TileJob<Scalar>& job, const Scalar* image,
+                        const Scalar* image_gradient, Scalar* sums);
   const char* name;
 };
 

@@ -26,9 +26,10 @@ const SplatKernels<double>& kernels() {
 template <>
 const SplatKernels<float>& kernels() {
 #ifdef FIGURINE_X86_KERNELS
-  static const SplatKernels<float>& chosen = __builtin_cpu_supports("x86-64-v4")   ? avx512::kFloatKernels
-                                             : __builtin_cpu_supports("x86-64-v3") ? avx2::kFloatKernels
-                                                                                   : generic::kFloatKernels;
+  static const SplatKernels<float>& chosen =
+      __builtin_cpu_supports("x86-64-v4")   ? avx512::kFloatKernels
+      : __builtin_cpu_supports("x86-64-v3") ? avx2::kFloatKernels
+                                            : generic::kFloatKernels;
   return chosen;
 #else
   return generic::kFloatKernels;
@@ -45,7 +46,8 @@ void radix_sort(std::vector<SortItem>& items, std::vector<SortItem>& scratch) {
   scratch.resize(items.size());
   std::vector<uint32_t> first(3 * kBuckets, 0);
   for (const SortItem& item : items) {
-    for (int pass = 0; pass < 3; ++pass) ++first[pass * kBuckets + ((item.key >> (pass * kBits)) & (kBuckets - 1))];
+    for (int pass = 0; pass < 3; ++pass)
+      ++first[pass * kBuckets + ((item.key >> (pass * kBits)) & (kBuckets - 1))];
   }
   for (int pass = 0; pass < 3; ++pass) {
     uint32_t* const bucket = &first[pass * kBuckets];
@@ -55,7 +57,8 @@ void radix_sort(std::vector<SortItem>& items, std::vector<SortItem>& scratch) {
       bucket[b] = sum;
       sum += count;
     }
-    for (const SortItem& item : items) scratch[bucket[(item.key >> (pass * kBits)) & (kBuckets - 1)]++] = item;
+    for (const SortItem& item : items)
+      scratch[bucket[(item.key >> (pass * kBits)) & (kBuckets - 1)]++] = item;
     items.swap(scratch);
   }
 }
@@ -87,9 +90,10 @@ struct Splatter<Scalar>::Impl {
   std::vector<TileBox> boxes;                // [n]
   std::vector<uint32_t> depth_keys;          // [n] kNotVisible: left out
   std::vector<SortItem> order, sort_scratch;
-  std::vector<uint32_t> tile_first, tile_cursor;        // [tiles + 1]
-  std::vector<SplatPair> pairs;                         // by tile, front to back
-  std::vector<uint32_t> slots, slot_first, slot_count;  // pairs of Gaussian i: slots[slot_first[i] .. + slot_count[i])
+  std::vector<uint32_t> tile_first, tile_cursor;  // [tiles + 1]
+  std::vector<SplatPair> pairs;                   // by tile, front to back
+  std::vector<uint32_t> slots, slot_first,
+      slot_count;  // pairs of Gaussian i: slots[slot_first[i] .. + slot_count[i])
   std::vector<uint64_t> tile_evaluations;
   std::vector<Scalar> pair_sums;  // [pairs, kPairSums]
 };
@@ -105,7 +109,9 @@ void Splatter<Scalar>::Impl::project_chunk(uint32_t begin, uint32_t end) {
     const Scalar opacity = gaussians.opacity[i];
     if (!(opacity >= cut) || !std::isfinite(opacity)) continue;
     Projected<Scalar> at;
-    if (!project(view, gaussians.position_m + 3 * size_t(i), gaussians.covariance_factor + 9 * size_t(i), at)) continue;
+    if (!project(view, gaussians.position_m + 3 * size_t(i),
+                 gaussians.covariance_factor + 9 * size_t(i), at))
+      continue;
     SplatRecord<Scalar>& record = records[i];
     record.mean_x = at.mean[0];
     record.mean_y = at.mean[1];
@@ -113,23 +119,34 @@ void Splatter<Scalar>::Impl::project_chunk(uint32_t begin, uint32_t end) {
     record.k = at.b / at.c;
     record.q = Scalar(0.5) * log2e / at.c;
     record.log2_opacity = std::log2(opacity);
-    // Box of alpha >= cut, widened by a hundredth of a pixel for rounding; the pixel's own test decides.
+    // Box of alpha >= cut, widened by a hundredth of a pixel for rounding; the pixel's own test
+    // decides.
     const Scalar reach = std::max(Scalar(2) * (record.log2_opacity - log2_cut) / log2e, Scalar(0));
-    const Scalar rx = std::sqrt(reach * at.a) * Scalar(1.0001) + Scalar(0.01), ry = std::sqrt(reach * at.c) * Scalar(1.0001) + Scalar(0.01);
+    const Scalar rx = std::sqrt(reach * at.a) * Scalar(1.0001) + Scalar(0.01),
+                 ry = std::sqrt(reach * at.c) * Scalar(1.0001) + Scalar(0.01);
     // First and last pixel whose centre is inside, relative to the crop.
-    const Scalar left = at.mean[0] - rx - Scalar(0.5) - Scalar(crop.x), right = at.mean[0] + rx - Scalar(0.5) - Scalar(crop.x);
-    const Scalar top = at.mean[1] - ry - Scalar(0.5) - Scalar(crop.y), bottom = at.mean[1] + ry - Scalar(0.5) - Scalar(crop.y);
-    if (!(left <= Scalar(crop.width - 1)) || !(right >= 0) || !(top <= Scalar(crop.height - 1)) || !(bottom >= 0)) continue;
+    const Scalar left = at.mean[0] - rx - Scalar(0.5) - Scalar(crop.x),
+                 right = at.mean[0] + rx - Scalar(0.5) - Scalar(crop.x);
+    const Scalar top = at.mean[1] - ry - Scalar(0.5) - Scalar(crop.y),
+                 bottom = at.mean[1] + ry - Scalar(0.5) - Scalar(crop.y);
+    if (!(left <= Scalar(crop.width - 1)) || !(right >= 0) || !(top <= Scalar(crop.height - 1)) ||
+        !(bottom >= 0))
+      continue;
     const auto tile_of = [](Scalar pixel, uint32_t size) {
-      return static_cast<uint16_t>(static_cast<uint32_t>(std::clamp(pixel, Scalar(0), Scalar(size - 1))) / kTileSize);
+      return static_cast<uint16_t>(
+          static_cast<uint32_t>(std::clamp(pixel, Scalar(0), Scalar(size - 1))) / kTileSize);
     };
     Scalar rgb[3];
-    if (!sh_colour(view, gaussians.sh_degree, gaussians.position_m + 3 * size_t(i), gaussians.sh + sh_stride * size_t(i), rgb)) continue;
+    if (!sh_colour(view, gaussians.sh_degree, gaussians.position_m + 3 * size_t(i),
+                   gaussians.sh + sh_stride * size_t(i), rgb))
+      continue;
     record.red = rgb[0];
     record.green = rgb[1];
     record.blue = rgb[2];
-    boxes[i] = {tile_of(std::ceil(left), crop.width), static_cast<uint16_t>(tile_of(right, crop.width) + 1),
-                tile_of(std::ceil(top), crop.height), static_cast<uint16_t>(tile_of(bottom, crop.height) + 1)};
+    boxes[i] = {tile_of(std::ceil(left), crop.width),
+                static_cast<uint16_t>(tile_of(right, crop.width) + 1),
+                tile_of(std::ceil(top), crop.height),
+                static_cast<uint16_t>(tile_of(bottom, crop.height) + 1)};
     depth_keys[i] = std::bit_cast<uint32_t>(at.depth);
   }
 }
@@ -191,7 +208,8 @@ size_t Splatter<Scalar>::Impl::tile_offset(uint32_t tile) const {
 }
 
 template <class Scalar>
-void Splatter<Scalar>::Impl::backward_chunk(uint32_t begin, uint32_t end, const GaussianGradients<Scalar>& gradients) {
+void Splatter<Scalar>::Impl::backward_chunk(uint32_t begin, uint32_t end,
+                                            const GaussianGradients<Scalar>& gradients) {
   const ProjectionCamera<Scalar> view(camera);
   const uint32_t sh_stride = 3 * sh_coefficients(gaussians.sh_degree);
   for (uint32_t i = begin; i < end; ++i) {
@@ -220,27 +238,32 @@ void Splatter<Scalar>::Impl::backward_chunk(uint32_t begin, uint32_t end, const 
     project(view, at_position, gaussians.covariance_factor + 9 * size_t(i), at);
     // power = -(P t^2 + Q dy^2), t = dx - K dy, dx = x - mean_x, dy = y - mean_y
     const Scalar p = Scalar(0.5) * at.c / at.determinant, k = at.b / at.c, q = Scalar(0.5) / at.c;
-    const ProjectedGradient<Scalar> gradient{.mean = {2 * p * sums[kSumST], 2 * (q * sums[kSumSY] - p * k * sums[kSumST])},
-                                             .p = -sums[kSumSTT],
-                                             .k = 2 * p * sums[kSumSTY],
-                                             .q = -sums[kSumSYY]};
+    const ProjectedGradient<Scalar> gradient{
+        .mean = {2 * p * sums[kSumST], 2 * (q * sums[kSumSY] - p * k * sums[kSumST])},
+        .p = -sums[kSumSTT],
+        .k = 2 * p * sums[kSumSTY],
+        .q = -sums[kSumSYY]};
     project_backward(view, at, gradient, position, factor);
     const Scalar rgb[3] = {records[i].red, records[i].green, records[i].blue};
-    sh_colour_backward(view, gaussians.sh_degree, at_position, gaussians.sh + sh_stride * size_t(i), rgb, sums + kSumRed, sh, position);
+    sh_colour_backward(view, gaussians.sh_degree, at_position, gaussians.sh + sh_stride * size_t(i),
+                       rgb, sums + kSumRed, sh, position);
     gradients.opacity[i] = sums[kSumS] / gaussians.opacity[i];  // alpha is proportional to opacity
   }
 }
 
 template <class Scalar>
-Splatter<Scalar>::Splatter(const SplatterOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+Splatter<Scalar>::Splatter(const SplatterOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {}
 template <class Scalar>
 Splatter<Scalar>::~Splatter() = default;
 template <class Scalar>
 Splatter<Scalar>::Splatter(Splatter&&) noexcept = default;
 
 template <class Scalar>
-void Splatter<Scalar>::forward(const GaussianArrays<Scalar>& gaussians, const Camera& camera, const PixelRect& crop, Scalar* image) {
-  FIG_CHECK(crop.width > 0 && crop.height > 0 && crop.x + crop.width <= camera.width_px && crop.y + crop.height <= camera.height_px,
+void Splatter<Scalar>::forward(const GaussianArrays<Scalar>& gaussians, const Camera& camera,
+                               const PixelRect& crop, Scalar* image) {
+  FIG_CHECK(crop.width > 0 && crop.height > 0 && crop.x + crop.width <= camera.width_px &&
+                crop.y + crop.height <= camera.height_px,
             "the crop must lie within the image");
   FIG_CHECK(gaussians.sh_degree <= kMaxShDegree, "SH degree");
   Impl& s = *impl_;
@@ -255,7 +278,9 @@ void Splatter<Scalar>::forward(const GaussianArrays<Scalar>& gaussians, const Ca
   s.slot_first.resize(gaussians.count);
   s.slot_count.resize(gaussians.count);
   const uint32_t chunks = (gaussians.count + kChunk - 1) / kChunk;
-  parallel_for(s.options.threads, chunks, [&](uint32_t c) { s.project_chunk(c * kChunk, std::min(gaussians.count, (c + 1) * kChunk)); });
+  parallel_for(s.options.threads, chunks, [&](uint32_t c) {
+    s.project_chunk(c * kChunk, std::min(gaussians.count, (c + 1) * kChunk));
+  });
   s.bin();
   const uint32_t tiles = s.tiles_x * s.tiles_y;
   s.tile_evaluations.assign(tiles, 0);
@@ -270,7 +295,8 @@ void Splatter<Scalar>::forward(const GaussianArrays<Scalar>& gaussians, const Ca
 }
 
 template <class Scalar>
-void Splatter<Scalar>::backward(const Scalar* image, const Scalar* image_gradient, const GaussianGradients<Scalar>& gradients) {
+void Splatter<Scalar>::backward(const Scalar* image, const Scalar* image_gradient,
+                                const GaussianGradients<Scalar>& gradients) {
   Impl& s = *impl_;
   s.pair_sums.resize(s.pairs.size() * kPairSums);
   const SplatKernels<Scalar>& kernel = kernels<Scalar>();
@@ -278,10 +304,13 @@ void Splatter<Scalar>::backward(const Scalar* image, const Scalar* image_gradien
     const TileJob<Scalar> job = s.tile_job(tile);
     if (job.count == 0) return;
     const size_t offset = s.tile_offset(tile);
-    kernel.backward_tile(job, image + offset, image_gradient + offset, s.pair_sums.data() + size_t(s.tile_first[tile]) * kPairSums);
+    kernel.backward_tile(job, image + offset, image_gradient + offset,
+                         s.pair_sums.data() + size_t(s.tile_first[tile]) * kPairSums);
   });
   const uint32_t count = s.gaussians.count, chunks = (count + kChunk - 1) / kChunk;
-  parallel_for(s.options.threads, chunks, [&](uint32_t c) { s.backward_chunk(c * kChunk, std::min(count, (c + 1) * kChunk), gradients); });
+  parallel_for(s.options.threads, chunks, [&](uint32_t c) {
+    s.backward_chunk(c * kChunk, std::min(count, (c + 1) * kChunk), gradients);
+  });
 }
 
 template <class Scalar>

@@ -1,16 +1,19 @@
-// A differentiable splatter on the CPU: Gaussians to premultiplied RGBA of a crop rectangle, and the analytic gradient back to every
-// parameter.
+// A differentiable splatter on the CPU: Gaussians to premultiplied RGBA of a crop rectangle, and
+// the analytic gradient back to every parameter.
 //
-// Semantics are those of figurine/gaussian.h and docs/numerics.md, "Splatting"; tests hold it against tests/oracle/splat_oracle.h.
-// Instantiated for float (training) and double (finite-difference checks). Does not decode network outputs (head.h) and knows no LibTorch
+// Semantics are those of figurine/gaussian.h and docs/numerics.md, "Splatting"; tests hold it
+// against tests/oracle/splat_oracle.h. Instantiated for float (training) and double
+// (finite-difference checks). Does not decode network outputs (head.h) and knows no LibTorch
 // (render.h).
 //
-// Idea: one depth sort, a stable counting bin into tiles of 32x32 pixels, and per (Gaussian, tile) a 64-bit mask of the 4x4 pixel blocks
-// that the ellipse alpha >= cut touches. Pixels of a block are the lanes of a vector. The backward pass walks every tile front to back
-// again: with B = sum over later contributions of (gradient . their share), which the forward image gives without storing anything per
-// contribution, dL/dalpha = T (g . colour) - B / (1 - alpha). Each (Gaussian, tile) pair has its own nine sums, added up per Gaussian in a
-// fixed order. Based on: Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023; Zwicker et al., EWA Splatting,
-// 2002.
+// Idea: one depth sort, a stable counting bin into tiles of 32x32 pixels, and per (Gaussian, tile)
+// a 64-bit mask of the 4x4 pixel blocks that the ellipse alpha >= cut touches. Pixels of a block
+// are the lanes of a vector. The backward pass walks every tile front to back again: with B = sum
+// over later contributions of (gradient . their share), which the forward image gives without
+// storing anything per contribution, dL/dalpha = T (g . colour) - B / (1 - alpha). Each (Gaussian,
+// tile) pair has its own nine sums, added up per Gaussian in a fixed order. Based on: Kerbl et al.,
+// 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023; Zwicker et al., EWA
+// Splatting, 2002.
 #pragma once
 
 #include <cstdint>
@@ -64,13 +67,17 @@ class Splatter {
   ~Splatter();
   Splatter(Splatter&&) noexcept;
 
-  // image: [4, crop.height, crop.width] planes R, G, B (premultiplied) and alpha = 1 - T. The crop must lie within the camera's image.
-  // Gaussians that are not finite are left out. The same input gives the same image for any number of threads.
-  void forward(const GaussianArrays<Scalar>& gaussians, const Camera& camera, const PixelRect& crop, Scalar* image);
+  // image: [4, crop.height, crop.width] planes R, G, B (premultiplied) and alpha = 1 - T. The crop
+  // must lie within the camera's image. Gaussians that are not finite are left out. The same input
+  // gives the same image for any number of threads.
+  void forward(const GaussianArrays<Scalar>& gaussians, const Camera& camera, const PixelRect& crop,
+               Scalar* image);
 
-  // Gradients of the last forward(), whose arrays and image must still be there unchanged. image_gradient: dL/dimage, same shape as the
-  // image. Gaussians that were left out or culled get zeros. The same input gives the same gradients for any number of threads.
-  void backward(const Scalar* image, const Scalar* image_gradient, const GaussianGradients<Scalar>& gradients);
+  // Gradients of the last forward(), whose arrays and image must still be there unchanged.
+  // image_gradient: dL/dimage, same shape as the image. Gaussians that were left out or culled get
+  // zeros. The same input gives the same gradients for any number of threads.
+  void backward(const Scalar* image, const Scalar* image_gradient,
+                const GaussianGradients<Scalar>& gradients);
 
   const SplatterStatistics& statistics() const;
 

@@ -19,9 +19,10 @@ const SsimKernels<double>& kernels() {
 template <>
 const SsimKernels<float>& kernels() {
 #ifdef FIGURINE_X86_KERNELS
-  static const SsimKernels<float>& chosen = __builtin_cpu_supports("x86-64-v4")   ? avx512::kFloatSsimKernels
-                                            : __builtin_cpu_supports("x86-64-v3") ? avx2::kFloatSsimKernels
-                                                                                  : generic::kFloatSsimKernels;
+  static const SsimKernels<float>& chosen =
+      __builtin_cpu_supports("x86-64-v4")   ? avx512::kFloatSsimKernels
+      : __builtin_cpu_supports("x86-64-v3") ? avx2::kFloatSsimKernels
+                                            : generic::kFloatSsimKernels;
   return chosen;
 #else
   return generic::kFloatSsimKernels;
@@ -31,18 +32,21 @@ const SsimKernels<float>& kernels() {
 }  // namespace
 
 template <class Scalar>
-double ssim(const PlanarImages<Scalar>& images, uint32_t threads, SsimScratch<Scalar>& scratch, Scalar* gradient) {
+double ssim(const PlanarImages<Scalar>& images, uint32_t threads, SsimScratch<Scalar>& scratch,
+            Scalar* gradient) {
   const size_t plane = size_t(images.height) * images.width, values = plane * images.channels;
   if (values == 0) return 1;
   double weights[kSsimTaps], sum = 0;
-  for (uint32_t k = 0; k < kSsimTaps; ++k) sum += weights[k] = std::exp(-0.5 * std::pow((double(k) - kSsimRadius) / 1.5, 2));
+  for (uint32_t k = 0; k < kSsimTaps; ++k)
+    sum += weights[k] = std::exp(-0.5 * std::pow((double(k) - kSsimRadius) / 1.5, 2));
   const uint32_t tiles_x = (images.width + kSsimTileColumns - 1) / kSsimTileColumns,
                  tiles_y = (images.height + kSsimTileRows - 1) / kSsimTileRows;
   const uint32_t tiles = tiles_x * tiles_y * images.channels;
   scratch.tile_sums.assign(tiles, 0);
   const auto tile_at = [&](uint32_t index) {
     const uint32_t channel = index / (tiles_x * tiles_y), within = index % (tiles_x * tiles_y);
-    const uint32_t column = within % tiles_x * kSsimTileColumns, row = within / tiles_x * kSsimTileRows;
+    const uint32_t column = within % tiles_x * kSsimTileColumns,
+                   row = within / tiles_x * kSsimTileRows;
     SsimTile<Scalar> tile{.x = images.x + channel * plane,
                           .y = images.y + channel * plane,
                           .width = images.width,

@@ -1,7 +1,9 @@
-// SSIM and its gradient on the CPU: a fused, separable, threaded 11x11 window. Torch's grouped convolutions take several times as long.
+// SSIM and its gradient on the CPU: a fused, separable, threaded 11x11 window. Torch's grouped
+// convolutions take several times as long.
 //
-// As in 3DGS: Gaussian window of sigma 1.5, zero padding, constants 0.01^2 and 0.03^2, mean over all pixels and channels.
-// Based on: Wang et al., Image Quality Assessment: From Error Visibility to Structural Similarity, 2004, eq. 13.
+// As in 3DGS: Gaussian window of sigma 1.5, zero padding, constants 0.01^2 and 0.03^2, mean over
+// all pixels and channels. Based on: Wang et al., Image Quality Assessment: From Error Visibility
+// to Structural Similarity, 2004, eq. 13.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +24,11 @@ struct SsimScratch {
   std::vector<Scalar> tile_sums;
 };
 
-// The mean SSIM of the two images and, where gradient is not null, d(mean SSIM)/dx [channels,height,width]. The same for any number of
-// threads.
+// The mean SSIM of the two images and, where gradient is not null, d(mean SSIM)/dx
+// [channels,height,width]. The same for any number of threads.
 template <class Scalar>
-double ssim(const PlanarImages<Scalar>& images, uint32_t threads, SsimScratch<Scalar>& scratch, Scalar* gradient);
+double ssim(const PlanarImages<Scalar>& images, uint32_t threads, SsimScratch<Scalar>& scratch,
+            Scalar* gradient);
 
 extern template double ssim(const PlanarImages<float>&, uint32_t, SsimScratch<float>&, float*);
 extern template double ssim(const PlanarImages<double>&, uint32_t, SsimScratch<double>&, double*);

@@ -1,4 +1,5 @@
-// The inner loops of SSIM, one tile of 64 columns at a time; compiled once per instruction set (ssim_kernels.inc), like the splatter's.
+// The inner loops of SSIM, one tile of 64 columns at a time; compiled once per instruction set
+// (ssim_kernels.inc), like the splatter's.
 #pragma once
 
 #include <stdint.h>
@@ -18,7 +19,8 @@ struct SsimTile {
   uint32_t columns, rows;    // pixels of the tile, at most kSsimTileColumns x kSsimTileRows
   Scalar window[kSsimTaps];  // 1-D weights, sum 1
   Scalar c1, c2;
-  Scalar* gradient;  // plane of the same size, or null: scale d(sum of SSIM over the whole plane)/dx is written at the tile's pixels
+  Scalar* gradient;  // plane of the same size, or null: scale d(sum of SSIM over the whole
+                     // plane)/dx is written at the tile's pixels
   Scalar scale;
 };
 

@@ -13,7 +13,8 @@ namespace {
 
 constexpr at::MemoryFormat kChannelsLast = at::MemoryFormat::ChannelsLast;
 
-// SplitMix64 (Steele et al., Fast Splittable Pseudorandom Number Generators, 2014): integers only, so the same everywhere.
+// SplitMix64 (Steele et al., Fast Splittable Pseudorandom Number Generators, 2014): integers only,
+// so the same everywhere.
 class Random {
  public:
   explicit Random(uint64_t seed) : state_(seed) {}
@@ -37,29 +38,38 @@ torch::Tensor batched(const torch::Tensor& t, const ConvolutionSlot& slot) {
   constexpr int64_t kBatch = 16;
   const int64_t channels = t.size(1), height = t.size(2), width = t.size(3);
   if (slot.kernel != 1 || height % kBatch != 0) return t;
-  return t.permute({0, 2, 3, 1}).reshape({kBatch, height / kBatch, width, channels}).permute({0, 3, 1, 2});
+  return t.permute({0, 2, 3, 1})
+      .reshape({kBatch, height / kBatch, width, channels})
+      .permute({0, 3, 1, 2});
 }
 
 torch::Tensor unbatched(const torch::Tensor& t, const torch::Tensor& like) {
   if (t.size(0) == 1) return t;
-  return t.permute({0, 2, 3, 1}).reshape({1, like.size(2), like.size(3), t.size(1)}).permute({0, 3, 1, 2});
+  return t.permute({0, 2, 3, 1})
+      .reshape({1, like.size(2), like.size(3), t.size(1)})
+      .permute({0, 3, 1, 2});
 }
 
-void give_back(const Layer& layer, const torch::Tensor& gradient, const torch::Tensor& a, const torch::Tensor& pooled,
-               ValueGradients& gradients) {
+void give_back(const Layer& layer, const torch::Tensor& gradient, const torch::Tensor& a,
+               const torch::Tensor& pooled, ValueGradients& gradients) {
   switch (layer.op) {
     case LayerOp::kConv2d:
       break;  // the caller's
     case LayerOp::kMaxPool2:
-      gradients.give(layer.inputs[0], at::max_pool2d_with_indices_backward(gradient, a, {2, 2}, {2, 2}, {0, 0}, {1, 1}, false, pooled));
+      gradients.give(layer.inputs[0],
+                     at::max_pool2d_with_indices_backward(gradient, a, {2, 2}, {2, 2}, {0, 0},
+                                                          {1, 1}, false, pooled));
       break;
     case LayerOp::kUpsample2:
-      gradients.give(layer.inputs[0], at::upsample_bilinear2d_backward(gradient, {2 * a.size(2), 2 * a.size(3)}, a.sizes(), false));
+      gradients.give(layer.inputs[0],
+                     at::upsample_bilinear2d_backward(gradient, {2 * a.size(2), 2 * a.size(3)},
+                                                      a.sizes(), false));
       break;
     case LayerOp::kConcat: {
       const int64_t first = a.size(1);
       gradients.give(layer.inputs[0], gradient.narrow(1, 0, first).contiguous(kChannelsLast));
-      gradients.give(layer.inputs[1], gradient.narrow(1, first, gradient.size(1) - first).contiguous(kChannelsLast));
+      gradients.give(layer.inputs[1],
+                     gradient.narrow(1, first, gradient.size(1) - first).contiguous(kChannelsLast));
       break;
     }
   }
@@ -67,14 +77,17 @@ void give_back(const Layer& layer, const torch::Tensor& gradient, const torch::T
 
 namespace {
 
-// Every value of one evaluation [layers + 1], and what the layers' backward passes need beside: cast kernels, indices of pools.
+// Every value of one evaluation [layers + 1], and what the layers' backward passes need beside:
+// cast kernels, indices of pools.
 struct Evaluation {
   std::vector<torch::Tensor> values, extra;
 };
 
-Evaluation evaluate_layers(const torch::Tensor& flat, const torch::Tensor& input, const UNetPlan& plan) {
+Evaluation evaluate_layers(const torch::Tensor& flat, const torch::Tensor& input,
+                           const UNetPlan& plan) {
   const std::vector<Layer>& layers = plan.network.layers;
-  Evaluation evaluation{std::vector<torch::Tensor>(layers.size() + 1), std::vector<torch::Tensor>(layers.size())};
+  Evaluation evaluation{std::vector<torch::Tensor>(layers.size() + 1),
+                        std::vector<torch::Tensor>(layers.size())};
   auto& [values, extra] = evaluation;
   values[0] = as_channels_last(input).to(plan.type_of(0));
   for (size_t i = 0; i < layers.size(); ++i) {
@@ -85,8 +98,9 @@ Evaluation evaluate_layers(const torch::Tensor& flat, const torch::Tensor& input
         const torch::ScalarType type = plan.type_of(i);
         const ConvolutionSlot& slot = plan.slots[i];
         extra[i] = UNetPlan::kernel_of(flat, slot).to(type);
-        out = unbatched(at::convolution(batched(a.to(type), slot), extra[i], UNetPlan::bias_of(flat, slot).to(type), {1, 1}, slot.padding(),
-                                        {1, 1}, false, {0, 0}, 1),
+        out = unbatched(at::convolution(batched(a.to(type), slot), extra[i],
+                                        UNetPlan::bias_of(flat, slot).to(type), {1, 1},
+                                        slot.padding(), {1, 1}, false, {0, 0}, 1),
                         a);
         if (layers[i].relu) out.relu_();
         break;
@@ -105,11 +119,13 @@ Evaluation evaluate_layers(const torch::Tensor& flat, const torch::Tensor& input
   return evaluation;
 }
 
-// The whole network as one node of the graph: forward keeps every value, backward walks the layers in reverse. Saves the per-operation cost
-// of autograd and of autocast's casts, and writes all weight gradients into one flat tensor.
+// The whole network as one node of the graph: forward keeps every value, backward walks the layers
+// in reverse. Saves the per-operation cost of autograd and of autocast's casts, and writes all
+// weight gradients into one flat tensor.
 class RunUNet : public torch::autograd::Function<RunUNet> {
  public:
-  static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::Tensor& flat, const torch::Tensor& input,
+  static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::Tensor& flat,
+                               const torch::Tensor& input,
                                const c10::intrusive_ptr<UNetPlan>& plan) {
     auto [values, extra] = evaluate_layers(flat, input, *plan);
     torch::Tensor head = as_rows(values.back());
@@ -120,20 +136,25 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
     return head;
   }
 
-  static torch::autograd::tensor_list backward(torch::autograd::AutogradContext* context, torch::autograd::tensor_list output_gradients) {
-    const auto plan = c10::static_intrusive_pointer_cast<UNetPlan>(context->saved_data["plan"].toCapsule());
+  static torch::autograd::tensor_list backward(torch::autograd::AutogradContext* context,
+                                               torch::autograd::tensor_list output_gradients) {
+    const auto plan =
+        c10::static_intrusive_pointer_cast<UNetPlan>(context->saved_data["plan"].toCapsule());
     const std::vector<torch::Tensor> values = context->saved_data["values"].toTensorVector(),
                                      extra = context->saved_data["extra"].toTensorVector();
     const std::vector<Layer>& layers = plan->network.layers;
     torch::Tensor flat = torch::empty({plan->parameters});
     ValueGradients gradients(layers.size() + 1);
-    gradients.give(static_cast<uint32_t>(layers.size()), as_channels_last(output_gradients[0].contiguous()));
+    gradients.give(static_cast<uint32_t>(layers.size()),
+                   as_channels_last(output_gradients[0].contiguous()));
     for (size_t i = layers.size(); i-- > 0;) {
       const Layer& layer = layers[i];
       torch::Tensor gradient = gradients.take(i + 1);
       const torch::Tensor& a = values[layer.inputs[0]];
       if (!gradient.defined()) {  // nothing reads this value
-        if (layer.op == LayerOp::kConv2d) flat.narrow(0, plan->slots[i].weights, plan->slots[i].end() - plan->slots[i].weights).zero_();
+        if (layer.op == LayerOp::kConv2d)
+          flat.narrow(0, plan->slots[i].weights, plan->slots[i].end() - plan->slots[i].weights)
+              .zero_();
         continue;
       }
       if (layer.op != LayerOp::kConv2d) {
@@ -145,8 +166,9 @@ class RunUNet : public torch::autograd::Function<RunUNet> {
       if (layer.relu) gradient = at::threshold_backward(gradient, values[i + 1], 0);
       const bool to_input = layer.inputs[0] != 0;
       auto [d_input, d_kernel, d_bias] =
-          at::convolution_backward(batched(gradient.to(type), slot), batched(a.to(type), slot), extra[i], at::IntArrayRef(slot.out), {1, 1},
-                                   slot.padding(), {1, 1}, false, {0, 0}, 1, {to_input, true, true});
+          at::convolution_backward(batched(gradient.to(type), slot), batched(a.to(type), slot),
+                                   extra[i], at::IntArrayRef(slot.out), {1, 1}, slot.padding(),
+                                   {1, 1}, false, {0, 0}, 1, {to_input, true, true});
       UNetPlan::kernel_of(flat, slot).copy_(d_kernel);
       UNetPlan::bias_of(flat, slot).copy_(d_bias);
       if (to_input) gradients.give(layer.inputs[0], unbatched(d_input, a).to(a.scalar_type()));
@@ -163,12 +185,14 @@ struct PoseUNet::Impl {
   std::shared_ptr<const FakeQuantisation> fake_quantisation;  // null: plain
 };
 
-PoseUNet::PoseUNet(const Network& network, const PoseUNetOptions& options) : impl_(std::make_unique<Impl>()) {
+PoseUNet::PoseUNet(const Network& network, const PoseUNetOptions& options)
+    : impl_(std::make_unique<Impl>()) {
   UNetPlan& plan = *impl_->plan;
   plan.network = network;
   plan.precision = options.precision;
   plan.shapes = value_or_throw(infer_shapes(network, false), "pose UNet");
-  if (network.layers.back().op != LayerOp::kConv2d) throw InputError("pose UNet: network: the last layer is not a convolution");
+  if (network.layers.back().op != LayerOp::kConv2d)
+    throw InputError("pose UNet: network: the last layer is not a convolution");
   plan.slots.resize(network.layers.size());
   for (size_t i = 0; i < network.layers.size(); ++i) {
     Layer& layer = plan.network.layers[i];
@@ -182,8 +206,8 @@ PoseUNet::PoseUNet(const Network& network, const PoseUNetOptions& options) : imp
     slot.bias = slot.weights + slot.out * slot.kernel * slot.kernel * slot.in;
     plan.parameters = slot.end();
   }
-  // He et al., Delving Deep into Rectifiers, 2015, eq. 10, with a uniform distribution of the same variance: no libm but sqrt, which is
-  // exact everywhere.
+  // He et al., Delving Deep into Rectifiers, 2015, eq. 10, with a uniform distribution of the same
+  // variance: no libm but sqrt, which is exact everywhere.
   impl_->weights = torch::zeros({plan.parameters});
   float* const flat = impl_->weights.mutable_data_ptr<float>();
   Random random(options.seed);
@@ -194,7 +218,8 @@ PoseUNet::PoseUNet(const Network& network, const PoseUNetOptions& options) : imp
     if (plan.is_head(i)) bound *= options.head_weight_factor;
     for (int64_t k = slot.weights; k < slot.bias; ++k) flat[k] = bound * random.uniform();
     if (plan.is_head(i) && slot.out >= 14) {
-      for (int64_t channel = 11; channel < 14; ++channel) flat[slot.bias + channel] = options.rgb_bias;
+      for (int64_t channel = 11; channel < 14; ++channel)
+        flat[slot.bias + channel] = options.rgb_bias;
     }
   }
   impl_->weights.requires_grad_();
@@ -205,26 +230,31 @@ PoseUNet::~PoseUNet() = default;
 void PoseUNet::check_input(const torch::Tensor& input) const {
   const UNetPlan& plan = *impl_->plan;
   const int64_t size = plan.network.input_size, channels = plan.network.input_channels;
-  TORCH_CHECK(input.scalar_type() == torch::kFloat && input.is_contiguous() && input.sizes() == torch::IntArrayRef({size, size, channels}),
-              "PoseUNet: the input must be contiguous floats [", size, ",", size, ",", channels, "]");
+  TORCH_CHECK(input.scalar_type() == torch::kFloat && input.is_contiguous() &&
+                  input.sizes() == torch::IntArrayRef({size, size, channels}),
+              "PoseUNet: the input must be contiguous floats [", size, ",", size, ",", channels,
+              "]");
 }
 
 torch::Tensor PoseUNet::forward(const torch::Tensor& input) {
   check_input(input);
-  if (impl_->fake_quantisation != nullptr) return run_fake_quantised(impl_->weights, input, impl_->plan, impl_->fake_quantisation);
+  if (impl_->fake_quantisation != nullptr)
+    return run_fake_quantised(impl_->weights, input, impl_->plan, impl_->fake_quantisation);
   return RunUNet::apply(impl_->weights, input, impl_->plan);
 }
 
 std::vector<torch::Tensor> PoseUNet::evaluate_values(const torch::Tensor& input) const {
   check_input(input);
   torch::NoGradGuard no_gradient;
-  if (impl_->fake_quantisation != nullptr) return fake_quantised_values(impl_->weights, input, *impl_->plan, *impl_->fake_quantisation);
+  if (impl_->fake_quantisation != nullptr)
+    return fake_quantised_values(impl_->weights, input, *impl_->plan, *impl_->fake_quantisation);
   return evaluate_layers(impl_->weights, input, *impl_->plan).values;
 }
 
 void PoseUNet::set_fake_quantisation(std::shared_ptr<const FakeQuantisation> quantisation) {
   if (quantisation != nullptr) {
-    TORCH_CHECK(impl_->plan->precision == Precision::kFloat32, "fake quantisation needs float: bf16 holds no multiple of a scale");
+    TORCH_CHECK(impl_->plan->precision == Precision::kFloat32,
+                "fake quantisation needs float: bf16 holds no multiple of a scale");
     check_fake_quantisation(*quantisation, *impl_->plan);
   }
   impl_->fake_quantisation = std::move(quantisation);
@@ -235,17 +265,21 @@ torch::Tensor& PoseUNet::gradients() { return impl_->weights.mutable_grad(); }
 void PoseUNet::zero_gradients() { impl_->weights.mutable_grad() = torch::Tensor(); }
 
 void PoseUNet::share_weights(const PoseUNet& other) {
-  TORCH_CHECK(impl_->weights.numel() == other.impl_->weights.numel(), "PoseUNet: weights of another shape");
+  TORCH_CHECK(impl_->weights.numel() == other.impl_->weights.numel(),
+              "PoseUNet: weights of another shape");
   impl_->weights = other.impl_->weights.detach().requires_grad_();
 }
 
-uint64_t PoseUNet::parameter_count() const { return static_cast<uint64_t>(impl_->plan->parameters); }
+uint64_t PoseUNet::parameter_count() const {
+  return static_cast<uint64_t>(impl_->plan->parameters);
+}
 
 std::vector<uint64_t> PoseUNet::token_lengths() const {
   std::vector<uint64_t> lengths;
   for (size_t i = 0; i < impl_->plan->slots.size(); ++i) {
     const ConvolutionSlot& slot = impl_->plan->slots[i];
-    if (impl_->plan->network.layers[i].op == LayerOp::kConv2d) lengths.push_back(static_cast<uint64_t>(slot.end() - slot.weights));
+    if (impl_->plan->network.layers[i].op == LayerOp::kConv2d)
+      lengths.push_back(static_cast<uint64_t>(slot.end() - slot.weights));
   }
   return lengths;
 }
@@ -269,7 +303,8 @@ Network PoseUNet::export_network(std::vector<float>& storage) const {
   for (size_t i = 0; i < network.layers.size(); ++i) {
     if (network.layers[i].op != LayerOp::kConv2d) continue;
     const ConvolutionSlot& slot = impl_->plan->slots[i];
-    network.layers[i].weights = {storage.data() + slot.weights, static_cast<size_t>(slot.bias - slot.weights)};
+    network.layers[i].weights = {storage.data() + slot.weights,
+                                 static_cast<size_t>(slot.bias - slot.weights)};
     network.layers[i].bias = {storage.data() + slot.bias, static_cast<size_t>(slot.out)};
   }
   return network;
@@ -278,21 +313,28 @@ Network PoseUNet::export_network(std::vector<float>& storage) const {
 void PoseUNet::import_network(const Network& network) {
   const UNetPlan& plan = *impl_->plan;
   value_or_throw(infer_shapes(network, true), "pose UNet");
-  const auto differs = [](const std::string& what) { throw InputError("pose UNet: network: " + what + " differs from this UNet's"); };
-  if (network.input_size != plan.network.input_size || network.input_channels != plan.network.input_channels) differs("the input's shape");
+  const auto differs = [](const std::string& what) {
+    throw InputError("pose UNet: network: " + what + " differs from this UNet's");
+  };
+  if (network.input_size != plan.network.input_size ||
+      network.input_channels != plan.network.input_channels)
+    differs("the input's shape");
   if (network.layers.size() != plan.network.layers.size()) differs("the number of layers");
   for (size_t i = 0; i < network.layers.size(); ++i) {
     const Layer &theirs = network.layers[i], &ours = plan.network.layers[i];
-    if (theirs.op != ours.op || theirs.inputs[0] != ours.inputs[0] || theirs.inputs[1] != ours.inputs[1] ||
-        theirs.out_channels != ours.out_channels || theirs.kernel != ours.kernel || theirs.relu != ours.relu) {
+    if (theirs.op != ours.op || theirs.inputs[0] != ours.inputs[0] ||
+        theirs.inputs[1] != ours.inputs[1] || theirs.out_channels != ours.out_channels ||
+        theirs.kernel != ours.kernel || theirs.relu != ours.relu) {
       differs("layer " + std::to_string(i));
     }
   }
   float* const flat = impl_->weights.mutable_data_ptr<float>();
   for (size_t i = 0; i < network.layers.size(); ++i) {
     if (network.layers[i].op != LayerOp::kConv2d) continue;
-    std::copy(network.layers[i].weights.begin(), network.layers[i].weights.end(), flat + plan.slots[i].weights);
-    std::copy(network.layers[i].bias.begin(), network.layers[i].bias.end(), flat + plan.slots[i].bias);
+    std::copy(network.layers[i].weights.begin(), network.layers[i].weights.end(),
+              flat + plan.slots[i].weights);
+    std::copy(network.layers[i].bias.begin(), network.layers[i].bias.end(),
+              flat + plan.slots[i].bias);
   }
 }
 

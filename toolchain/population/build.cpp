@@ -41,15 +41,18 @@ void keep_recipe(const BuildOptions& options, const State& state) {
   const nlohmann::json before = train::read_json(state.recipe());
   for (const auto& [key, value] : now.items()) {
     // How they are packed and what is measured beside does not change the members.
-    if (key != "about" && key != "package" && key != "evaluation" && before.value(key, nlohmann::json()) != value) {
-      throw InputError(options.recipe + ": " + key + ": differs from " + state.recipe() + "; another recipe needs another folder");
+    if (key != "about" && key != "package" && key != "evaluation" &&
+        before.value(key, nlohmann::json()) != value) {
+      throw InputError(options.recipe + ": " + key + ": differs from " + state.recipe() +
+                       "; another recipe needs another folder");
     }
   }
 }
 
 body::BodyModel body_model(const Recipe& recipe, const BuildOptions& options) {
   if (recipe.mannequin) return body::make_mannequin();
-  if (options.makehuman.empty()) throw InputError("--makehuman: no directory given and FIGURINE_MAKEHUMAN is not set");
+  if (options.makehuman.empty())
+    throw InputError("--makehuman: no directory given and FIGURINE_MAKEHUMAN is not set");
   return body::make_makehuman_model(body::MakeHuman::load(options.makehuman), {});
 }
 
@@ -60,9 +63,12 @@ void make_body(const Recipe& recipe, const BuildOptions& options, const State& s
   const body::TexelBody texels = body::make_texel_body(model, uv_size);
   Provenance provenance = model.provenance;
   provenance.tool = "figurine-train " FIGURINE_VERSION;
-  provenance.settings.insert(provenance.settings.begin(), {"command", "body --uv " + std::to_string(uv_size)});
-  throw_if_error(ports::write_file_atomically(state.body(), value_or_throw(write_package(texels.view(), provenance), state.body())),
-                 "cannot save");
+  provenance.settings.insert(provenance.settings.begin(),
+                             {"command", "body --uv " + std::to_string(uv_size)});
+  throw_if_error(
+      ports::write_file_atomically(
+          state.body(), value_or_throw(write_package(texels.view(), provenance), state.body())),
+      "cannot save");
 }
 
 struct Motions {
@@ -75,13 +81,15 @@ Motions read_motions(const Recipe& recipe, const std::string& recipe_path, const
   for (const MotionPiece& piece : recipe.motions) {
     const std::string path = find_clip(piece.clip, recipe_path);
     if (fs::path(path).extension() == ".fgn" && (piece.start || piece.frames)) {
-      throw InputError(recipe_path + ": motions: " + piece.clip + ": start and frames are for clips, this is a motion package");
+      throw InputError(recipe_path + ": motions: " + piece.clip +
+                       ": start and frames are for clips, this is a motion package");
     }
     body::RetargetOptions retarget;
     retarget.name = piece.name, retarget.start = piece.start, retarget.frames = piece.frames;
     motions.clips.push_back(body::read_clip(path, body, retarget));
     const std::string source = body::clip_source(path);
-    if (std::find(motions.sources.begin(), motions.sources.end(), source) == motions.sources.end()) motions.sources.push_back(source);
+    if (std::find(motions.sources.begin(), motions.sources.end(), source) == motions.sources.end())
+      motions.sources.push_back(source);
   }
   return motions;
 }
@@ -102,7 +110,8 @@ std::string figure(const nlohmann::json& value, const char* format) {
 std::string figures(const nlohmann::json& row) {
   if (!row.is_object()) return ",,,,,,";
   const nlohmann::json& quality = row.at("quality");
-  std::string text = "," + figure(row.at("train_seconds"), "%.1f") + "," + figure(row.at("capture_cpu_seconds"), "%.1f");
+  std::string text = "," + figure(row.at("train_seconds"), "%.1f") + "," +
+                     figure(row.at("capture_cpu_seconds"), "%.1f");
   text += "," + figure(quality.at("held_out_views").at("psnr_db"), "%.2f");
   for (const char* metric : {"psnr_db", "flat_psnr_db", "head_psnr_db"})
     text += "," + figure(quality.at("held_out_poses").at(metric), "%.2f");
@@ -110,12 +119,16 @@ std::string figures(const nlohmann::json& row) {
 }
 
 void save_table(const State& state, const std::vector<TableRow>& table) {
-  std::string text = "identity,split,status,train_seconds,capture_cpu_seconds,psnr_view_db,psnr_pose_db,flat_psnr_db,head_psnr_db,reason\n";
+  std::string text =
+      "identity,split,status,train_seconds,capture_cpu_seconds,psnr_view_db,psnr_pose_db,flat_psnr_"
+      "db,head_psnr_db,reason\n";
   for (const TableRow& row : table) {
-    text += row.identity.name() + "," + to_string(row.identity.split) + "," + row.status + figures(row.row) + ",";
+    text += row.identity.name() + "," + to_string(row.identity.split) + "," + row.status +
+            figures(row.row) + ",";
     text += (row.reason.empty() ? "" : train::csv_quoted(row.reason)) + "\n";
   }
-  throw_if_error(ports::write_file_atomically(state.table(), std::as_bytes(std::span(text))), "cannot save");
+  throw_if_error(ports::write_file_atomically(state.table(), std::as_bytes(std::span(text))),
+                 "cannot save");
 }
 
 void pack(const Recipe& recipe, const State& state) {
@@ -125,32 +138,38 @@ void pack(const Recipe& recipe, const State& state) {
                                        .split = state.split(),
                                        .levels = recipe.levels,
                                        .quiet = true};
-  throw_if_error(ports::write_file_atomically(state.package(), train::pack_population(options)), "cannot save");
+  throw_if_error(ports::write_file_atomically(state.package(), train::pack_population(options)),
+                 "cannot save");
 }
 
-// LibTorch starts threads, and a process that has some must not be forked: whatever calls it runs in a process of its own.
+// LibTorch starts threads, and a process that has some must not be forked: whatever calls it runs
+// in a process of its own.
 std::string pack_apart(const Recipe& recipe, const State& state) {
   std::string failure;
   const auto ended = [&](size_t, const train::JobResult& result) {
     if (!result.done) failure = result.text;
   };
-  train::run_in_slots(1, {}, [&](size_t) { return pack(recipe, state), std::string(); }, ended, [] {});
+  train::run_in_slots(
+      1, {}, [&](size_t) { return pack(recipe, state), std::string(); }, ended, [] {});
   return failure;
 }
 
 // All members that are not there yet, several at a time.
-void make_members(const BuildOptions& options, const Workshop& workshop, std::vector<TableRow>& table, train::Progress& progress) {
+void make_members(const BuildOptions& options, const Workshop& workshop,
+                  std::vector<TableRow>& table, train::Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   const auto late = [&] {
     return options.stop_after_s > 0 &&
-           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > options.stop_after_s;
+           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() >
+               options.stop_after_s;
   };
   std::vector<size_t> missing;
   size_t done = 0, failed = 0, since_packed = 0;
   for (size_t i = 0; i < table.size(); ++i) {
     const std::string name = table[i].identity.name();
     if (fs::exists(workshop.state.row(name)) && fs::exists(workshop.state.member(name))) {
-      table[i].row = train::read_json(workshop.state.row(name)), table[i].status = "finished", ++done;
+      table[i].row = train::read_json(workshop.state.row(name)), table[i].status = "finished",
+      ++done;
     } else {
       missing.push_back(i);
     }
@@ -167,20 +186,25 @@ void make_members(const BuildOptions& options, const Workshop& workshop, std::ve
       row.row = nlohmann::json::parse(result.text), ++done, ++since_packed;
     } else if (!result.interrupted) {
       row.reason = result.text, ++failed;
-      std::fprintf(stderr, "figurine-train: %s: %s\n", row.identity.name().c_str(), row.reason.c_str());
+      std::fprintf(stderr, "figurine-train: %s: %s\n", row.identity.name().c_str(),
+                   row.reason.c_str());
     }
     try {
       save_table(workshop.state, table);
     } catch (const InputError&) {
-      // The disk is full just now. Others may still finish and leave room; the last writing below says so if not.
+      // The disk is full just now. Others may still finish and leave room; the last writing below
+      // says so if not.
     }
   };
   const auto waiting = [&] {
     progress.show(static_cast<double>(done + failed) / static_cast<double>(table.size()),
-                  std::to_string(done) + " of " + std::to_string(table.size()) + " members, " + std::to_string(failed) + " failed");
+                  std::to_string(done) + " of " + std::to_string(table.size()) + " members, " +
+                      std::to_string(failed) + " failed");
   };
-  // In pieces, so that the package can be written between: it needs LibTorch, so a process, so a moment without others' results.
-  const size_t piece = options.pack_period > 0 ? options.pack_period : std::max<size_t>(1, missing.size());
+  // In pieces, so that the package can be written between: it needs LibTorch, so a process, so a
+  // moment without others' results.
+  const size_t piece =
+      options.pack_period > 0 ? options.pack_period : std::max<size_t>(1, missing.size());
   for (size_t first = 0; first < missing.size() && !late(); first += piece) {
     const size_t count = std::min(piece, missing.size() - first);
     train::run_in_slots(
@@ -212,12 +236,15 @@ void build(const BuildOptions& options) {
   make_initial_weights(workshop, options.slots, [&](const InitialWeightsProgress& at) {
     char line[128];
     if (at.captured < at.people) {
-      std::snprintf(line, sizeof(line), "initial weights, %zu of %zu people captured", at.captured, at.people);
+      std::snprintf(line, sizeof(line), "initial weights, %zu of %zu people captured", at.captured,
+                    at.people);
       return progress.show(0, line);
     }
-    const int length = std::snprintf(line, sizeof(line), "initial weights, round %u of %u", at.round + 1, at.rounds);
+    const int length = std::snprintf(line, sizeof(line), "initial weights, round %u of %u",
+                                     at.round + 1, at.rounds);
     if (at.psnr_db > 0) {
-      std::snprintf(line + length, sizeof(line) - static_cast<size_t>(length), ", training PSNR of the last %.2f dB", at.psnr_db);
+      std::snprintf(line + length, sizeof(line) - static_cast<size_t>(length),
+                    ", training PSNR of the last %.2f dB", at.psnr_db);
     }
     progress.show((at.round + at.share) / at.rounds, line);
   });
@@ -225,18 +252,21 @@ void build(const BuildOptions& options) {
   if (options.initial_weights_only) return;
 
   std::vector<TableRow> table;
-  for (const Identity& identity : identities_of(recipe)) table.push_back({.identity = identity, .reason = {}, .row = {}});
+  for (const Identity& identity : identities_of(recipe))
+    table.push_back({.identity = identity, .reason = {}, .row = {}});
   make_members(options, workshop, table, progress);
-  if (const std::string failure = pack_apart(recipe, state); !failure.empty()) throw InputError(failure);
+  if (const std::string failure = pack_apart(recipe, state); !failure.empty())
+    throw InputError(failure);
   size_t finished = 0, failed = 0;
-  for (const TableRow& row : table) finished += row.status == "finished", failed += row.status == "failed";
+  for (const TableRow& row : table)
+    finished += row.status == "finished", failed += row.status == "failed";
   if (!options.quiet) {
-    std::printf("%s: %zu of %zu members, package %s, table %s\n", options.state.c_str(), finished, table.size(), state.package().c_str(),
-                state.table().c_str());
+    std::printf("%s: %zu of %zu members, package %s, table %s\n", options.state.c_str(), finished,
+                table.size(), state.package().c_str(), state.table().c_str());
   }
   if (failed > 0)
-    throw InputError(options.state + ": " + std::to_string(failed) + " of " + std::to_string(table.size()) + " members failed, see " +
-                     state.table());
+    throw InputError(options.state + ": " + std::to_string(failed) + " of " +
+                     std::to_string(table.size()) + " members failed, see " + state.table());
 }
 
 }  // namespace figurine::population

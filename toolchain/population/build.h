@@ -1,6 +1,6 @@
-// Makes a whole population by its recipe: body, split, initial weights, members, package. Whatever is in the state folder is not made
-// again, so a build that was interrupted, killed or ran out of disk goes on when it is called once more, and gives the same weights to the
-// bit.
+// Makes a whole population by its recipe: body, split, initial weights, members, package. Whatever
+// is in the state folder is not made again, so a build that was interrupted, killed or ran out of
+// disk goes on when it is called once more, and gives the same weights to the bit.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ struct BuildOptions {
   bool quiet = false;
 };
 
-// Throws InputError: a bad recipe, another recipe than the folder's, or, when all others have ended, members that failed. Interrupted after
-// Ctrl-C.
+// Throws InputError: a bad recipe, another recipe than the folder's, or, when all others have
+// ended, members that failed. Interrupted after Ctrl-C.
 void build(const BuildOptions& options);
 
 }  // namespace figurine::population

@@ -25,12 +25,19 @@ std::string round_name(uint32_t round) {
   return digits;
 }
 
-// One round's weights and what was logged until then, in one file each: the newest complete pair is where work goes on.
+// One round's weights and what was logged until then, in one file each: the newest complete pair is
+// where work goes on.
 struct Rounds {
   std::string folder;
-  std::string weights(uint32_t after) const { return folder + "/after_" + round_name(after) + ".safetensors"; }
-  std::string history(uint32_t after) const { return folder + "/after_" + round_name(after) + ".csv"; }
-  std::string run(uint32_t round, size_t k) const { return folder + "/run_" + round_name(round) + "_" + std::to_string(k); }
+  std::string weights(uint32_t after) const {
+    return folder + "/after_" + round_name(after) + ".safetensors";
+  }
+  std::string history(uint32_t after) const {
+    return folder + "/after_" + round_name(after) + ".csv";
+  }
+  std::string run(uint32_t round, size_t k) const {
+    return folder + "/run_" + round_name(round) + "_" + std::to_string(k);
+  }
 
   uint32_t done(uint32_t rounds) const {
     for (uint32_t after = rounds; after > 0; --after) {
@@ -59,21 +66,26 @@ void make_folder(const std::string& path) {
 std::vector<Identity> learners(const Recipe& recipe) {
   std::vector<Identity> chosen;
   for (const Identity& identity : identities_of(recipe)) {
-    if (identity.split == Split::kTrain && chosen.size() < recipe.initial.identities) chosen.push_back(identity);
+    if (identity.split == Split::kTrain && chosen.size() < recipe.initial.identities)
+      chosen.push_back(identity);
   }
   return chosen;
 }
 
-// Runs all jobs and throws the first failure. waiting(number of those that have ended) is called between.
-std::vector<std::string> run_all(size_t count, unsigned slots, const std::function<std::string(size_t)>& job,
-                                 const std::function<std::string(size_t)>& name, const std::function<void(size_t)>& waiting) {
+// Runs all jobs and throws the first failure. waiting(number of those that have ended) is called
+// between.
+std::vector<std::string> run_all(size_t count, unsigned slots,
+                                 const std::function<std::string(size_t)>& job,
+                                 const std::function<std::string(size_t)>& name,
+                                 const std::function<void(size_t)>& waiting) {
   std::vector<std::string> results(count);
   std::string failure;
   size_t finished = 0;
   const auto ended = [&](size_t i, const train::JobResult& result) {
     ++finished;
     if (result.done) results[i] = result.text;
-    if (!result.done && !result.interrupted && failure.empty()) failure = name(i) + ": " + result.text;
+    if (!result.done && !result.interrupted && failure.empty())
+      failure = name(i) + ": " + result.text;
   };
   train::run_in_slots(count, {.slots = slots}, job, ended, [&] { waiting(finished); });
   if (!failure.empty()) throw InputError("initial weights: " + failure);
@@ -88,13 +100,14 @@ struct FineTuning {
 // Leaves the weights in the run's folder; returns run.json's figures.
 std::string fine_tune(const Workshop& workshop, const FineTuning& tuning) {
   const InitialWeightsRecipe& recipe = workshop.recipe.initial;
-  train::TrainRequest request{.data = tuning.data,
-                              .body = workshop.state.body(),
-                              .run = tuning.run,
-                              .settings = workshop.recipe.training,
-                              .command = "figurine-train population, initial weights of " + workshop.recipe.name,
-                              .resume = fs::exists(train::RunDirectory{tuning.run}.run_json()),
-                              .quiet = true};
+  train::TrainRequest request{
+      .data = tuning.data,
+      .body = workshop.state.body(),
+      .run = tuning.run,
+      .settings = workshop.recipe.training,
+      .command = "figurine-train population, initial weights of " + workshop.recipe.name,
+      .resume = fs::exists(train::RunDirectory{tuning.run}.run_json()),
+      .quiet = true};
   request.settings.init = tuning.init;
   request.settings.seed = tuning.seed;
   request.settings.schedule.budget = {.iterations = recipe.iterations, .seconds = 0};
@@ -103,7 +116,9 @@ std::string fine_tune(const Workshop& workshop, const FineTuning& tuning) {
   train::train_avatar(request);
   // Not from its result: a run that was finished before does not know its means any more.
   const nlohmann::json run = train::read_json(train::RunDirectory{tuning.run}.run_json());
-  return nlohmann::json{{"psnr_db", run.at("running").at("psnr_db")}, {"seconds", run.at("train_seconds")}}.dump();
+  return nlohmann::json{{"psnr_db", run.at("running").at("psnr_db")},
+                        {"seconds", run.at("train_seconds")}}
+      .dump();
 }
 
 void forget(const Rounds& rounds, uint32_t round, size_t per_round) {
@@ -113,12 +128,14 @@ void forget(const Rounds& rounds, uint32_t round, size_t per_round) {
 
 }  // namespace
 
-train::TensorFile reptile_step(const train::TensorFile& weights, const std::vector<train::TensorFile>& fine_tuned, double step) {
+train::TensorFile reptile_step(const train::TensorFile& weights,
+                               const std::vector<train::TensorFile>& fine_tuned, double step) {
   train::TensorFile next;
   for (const auto& [name, first] : fine_tuned.at(0).tensors) {
     train::NamedTensor& out = next.tensors[name] = first;
     const auto old = weights.tensors.find(name);
-    if (step < 1 && (old == weights.tensors.end() || old->second.shape != first.shape)) throw InputError(name + ": is not in the weights");
+    if (step < 1 && (old == weights.tensors.end() || old->second.shape != first.shape))
+      throw InputError(name + ": is not in the weights");
     for (const train::TensorFile& file : fine_tuned) {
       const auto found = file.tensors.find(name);
       if (found == file.tensors.end() || found->second.shape != first.shape)
@@ -126,7 +143,8 @@ train::TensorFile reptile_step(const train::TensorFile& weights, const std::vect
     }
     for (size_t i = 0; i < out.values.size(); ++i) {
       double mean = 0;
-      for (const train::TensorFile& file : fine_tuned) mean += double{file.tensors.at(name).values[i]};
+      for (const train::TensorFile& file : fine_tuned)
+        mean += double{file.tensors.at(name).values[i]};
       mean /= static_cast<double>(fine_tuned.size());
       const double from = step < 1 ? double{old->second.values[i]} : 0;
       out.values[i] = static_cast<float>(step < 1 ? from + step * (mean - from) : mean);
@@ -137,11 +155,13 @@ train::TensorFile reptile_step(const train::TensorFile& weights, const std::vect
 
 double reptile_step_size(const InitialWeightsRecipe& recipe, uint32_t round) {
   if (round == 0) return 1;  // from the common random weights
-  const double share = recipe.rounds > 1 ? static_cast<double>(round) / static_cast<double>(recipe.rounds - 1) : 1;
+  const double share =
+      recipe.rounds > 1 ? static_cast<double>(round) / static_cast<double>(recipe.rounds - 1) : 1;
   return recipe.first_step + share * (recipe.last_step - recipe.first_step);
 }
 
-void make_initial_weights(const Workshop& workshop, unsigned slots, const std::function<void(const InitialWeightsProgress&)>& show) {
+void make_initial_weights(const Workshop& workshop, unsigned slots,
+                          const std::function<void(const InitialWeightsProgress&)>& show) {
   const InitialWeightsRecipe& recipe = workshop.recipe.initial;
   const State& state = workshop.state;
   if (recipe.rounds == 0 || fs::exists(state.initial_weights())) return;
@@ -155,14 +175,17 @@ void make_initial_weights(const Workshop& workshop, unsigned slots, const std::f
     show(at);
   };
   run_all(
-      people.size(), slots, [&](size_t i) { return capture_identity(workshop, people[i], captures), std::string(); },
+      people.size(), slots,
+      [&](size_t i) { return capture_identity(workshop, people[i], captures), std::string(); },
       [&](size_t i) { return people[i].name(); }, count_captures);
   at.captured = people.size();
 
   uint32_t round = rounds.done(recipe.rounds);
   std::string history = round > 0 ? read_text(rounds.history(round)) : kHistoryHead;
   for (; round < recipe.rounds; ++round) {
-    const auto person = [&](size_t k) -> const Identity& { return people[(size_t{round} * recipe.per_round + k) % people.size()]; };
+    const auto person = [&](size_t k) -> const Identity& {
+      return people[(size_t{round} * recipe.per_round + k) % people.size()];
+    };
     const auto job = [&](size_t k) {
       return fine_tune(workshop, {.data = captures + "/" + person(k).name(),
                                   .run = rounds.run(round, k),
@@ -181,10 +204,12 @@ void make_initial_weights(const Workshop& workshop, unsigned slots, const std::f
       const nlohmann::json result = nlohmann::json::parse(results[k]);
       psnr_db += result.at("psnr_db").get<double>() / static_cast<double>(results.size());
       seconds += result.at("seconds").get<double>();
-      fine_tuned.push_back(train::read_tensor_file(train::RunDirectory{rounds.run(round, k)}.weights()));
+      fine_tuned.push_back(
+          train::read_tensor_file(train::RunDirectory{rounds.run(round, k)}.weights()));
     }
     const double step = reptile_step_size(recipe, round);
-    const train::TensorFile before = round > 0 ? train::read_tensor_file(rounds.weights(round)) : train::TensorFile{};
+    const train::TensorFile before =
+        round > 0 ? train::read_tensor_file(rounds.weights(round)) : train::TensorFile{};
     train::write_tensor_file(rounds.weights(round + 1), reptile_step(before, fine_tuned, step));
     char line[96];
     std::snprintf(line, sizeof(line), "%u,%.4f,%.3f,%.2f\n", round, step, psnr_db, seconds);
@@ -194,7 +219,8 @@ void make_initial_weights(const Workshop& workshop, unsigned slots, const std::f
     at.psnr_db = psnr_db;
   }
   save_text(state.initial() + "/history.csv", history);
-  train::write_tensor_file(state.initial_weights(), train::read_tensor_file(rounds.weights(recipe.rounds)));
+  train::write_tensor_file(state.initial_weights(),
+                           train::read_tensor_file(rounds.weights(recipe.rounds)));
   fs::remove_all(rounds.folder);
   fs::remove_all(captures);
 }

@@ -32,14 +32,17 @@ constexpr int kSheetQuality = 85;
 double cpu_s() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); };
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
 enum class Variant : uint8_t { kMember, kFrozenPose, kFromScratch };
 
 // Trains `run`, or finishes it, and opens what came of it.
-train::TrainedAvatar train(const Workshop& workshop, const std::string& data, const std::string& run, Variant variant) {
+train::TrainedAvatar train(const Workshop& workshop, const std::string& data,
+                           const std::string& run, Variant variant) {
   train::TrainRequest request{.data = data,
                               .body = workshop.state.body(),
                               .run = run,
@@ -58,29 +61,39 @@ void save(const std::string& path, std::span<const std::byte> bytes) {
   throw_if_error(ports::write_file_atomically(path, bytes), "cannot save");
 }
 
-// What the package's rounding costs this member: it is packed as a population of its own and looked at again.
-nlohmann::json rounding_loss(const Workshop& workshop, train::TrainedAvatar& avatar, std::span<const std::byte> package_bytes) {
+// What the package's rounding costs this member: it is packed as a population of its own and looked
+// at again.
+nlohmann::json rounding_loss(const Workshop& workshop, train::TrainedAvatar& avatar,
+                             std::span<const std::byte> package_bytes) {
   const AlignedBytes own(package_bytes);
   const Package package = value_or_throw(Package::open(own.bytes(), "member"), "member");
-  model::PoseUNet unet(package.avatar().network, {.precision = model::Precision::kFloat32, .seed = train::kInitialWeightsSeed});
-  if (!workshop.recipe.training.init.empty()) train::load_weights(workshop.recipe.training.init, unet);
+  model::PoseUNet unet(package.avatar().network, {.precision = model::Precision::kFloat32,
+                                                  .seed = train::kInitialWeightsSeed});
+  if (!workshop.recipe.training.init.empty())
+    train::load_weights(workshop.recipe.training.init, unet);
   std::vector<float> storage;
-  NewPopulation alone{
-      .name = "alone", .initial = unet.export_network(storage), .coding = DifferenceCoding::kInt8, .levels = workshop.recipe.levels};
+  NewPopulation alone{.name = "alone",
+                      .initial = unet.export_network(storage),
+                      .coding = DifferenceCoding::kInt8,
+                      .levels = workshop.recipe.levels};
   alone.members.push_back({.avatar = &package.avatar(), .provenance = &package.provenance()});
   const AlignedBytes rounded(value_or_throw(write_population(alone), "member"));
   const Package opened = value_or_throw(Package::open(rounded.bytes(), "member"), "member");
   std::vector<float> weights(member_floats(opened.population()));
   const Avatar member = open_member(opened.population(), 0, weights);
-  return evaluate::evaluate_requantization(avatar, member, {.view_frame_step = workshop.recipe.view_frame_step, .quiet = true});
+  return evaluate::evaluate_requantization(
+      avatar, member, {.view_frame_step = workshop.recipe.view_frame_step, .quiet = true});
 }
 
-bool contains(const std::vector<uint32_t>& list, uint32_t number) { return std::find(list.begin(), list.end(), number) != list.end(); }
+bool contains(const std::vector<uint32_t>& list, uint32_t number) {
+  return std::find(list.begin(), list.end(), number) != list.end();
+}
 
 // [iteration, seconds, training PSNR] over the run.
 nlohmann::json training_log(const std::string& run) {
   nlohmann::json rows = nlohmann::json::array();
-  for (const train::LogRow& row : train::load_log({run}, UINT64_MAX)) rows.push_back({row.iteration, row.seconds, row.psnr_db});
+  for (const train::LogRow& row : train::load_log({run}, UINT64_MAX))
+    rows.push_back({row.iteration, row.seconds, row.psnr_db});
   return rows;
 }
 
@@ -91,7 +104,8 @@ nlohmann::json about_person(const std::string& data) {
 
 }  // namespace
 
-void capture_identity(const Workshop& workshop, const Identity& identity, const std::string& folder) {
+void capture_identity(const Workshop& workshop, const Identity& identity,
+                      const std::string& folder) {
   const train::InterruptGuard interrupt;
   capture::CaptureRequest request{.output = folder,
                                   .makehuman = workshop.makehuman,
@@ -105,9 +119,11 @@ void capture_identity(const Workshop& workshop, const Identity& identity, const 
                                   .limits = identity.group->limits,
                                   .tool = "figurine-train " FIGURINE_VERSION,
                                   .sources = workshop.sources};
-  const capture::CaptureEnd end = capture::capture_identities(request, workshop.body.package, workshop.motions,
-                                                              [&](const capture::CaptureProgress&) { return !interrupt.requested(); });
-  if (end == capture::CaptureEnd::kStopped) throw train::Interrupted(identity.name() + ": stopped while it was captured");
+  const capture::CaptureEnd end = capture::capture_identities(
+      request, workshop.body.package, workshop.motions,
+      [&](const capture::CaptureProgress&) { return !interrupt.requested(); });
+  if (end == capture::CaptureEnd::kStopped)
+    throw train::Interrupted(identity.name() + ": stopped while it was captured");
 }
 
 nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
@@ -115,7 +131,8 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
   const std::string name = identity.name(), run = state.run(name);
   const std::string data = state.captures() + "/" + name;
   const auto clean_up = [&] {
-    for (const std::string& folder : {run, state.frozen_run(name), state.scratch_run(name), data}) fs::remove_all(folder);
+    for (const std::string& folder : {run, state.frozen_run(name), state.scratch_run(name), data})
+      fs::remove_all(folder);
   };
   if (fs::exists(state.row(name)) && fs::exists(state.member(name))) {
     clean_up();  // it may have been killed just before
@@ -127,8 +144,10 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
 
   const double train_start = cpu_s();
   train::TrainedAvatar avatar = train(workshop, data, run, Variant::kMember);
-  const double train_cpu = cpu_s() - train_start;  // of this attempt: less than all of it after an interruption
-  const evaluate::ReconstructionOptions looking{.quiet = true, .view_frame_step = workshop.recipe.view_frame_step};
+  const double train_cpu =
+      cpu_s() - train_start;  // of this attempt: less than all of it after an interruption
+  const evaluate::ReconstructionOptions looking{.quiet = true,
+                                                .view_frame_step = workshop.recipe.view_frame_step};
   const nlohmann::json quality = evaluate::evaluate_reconstruction(avatar, looking);
   train::write_json(train::RunDirectory{run}.evaluation(), quality);
   const std::vector<std::byte> package = train::pack_avatar(avatar, {run}, {.golden = false});
@@ -142,18 +161,23 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
                      {"capture_cpu_seconds", capture_seconds},
                      {"training_psnr_db", description.at("running").at("psnr_db")},
                      {"quality", quality}};
-  if (contains(workshop.recipe.rounded, identity.number)) row["rounding"] = rounding_loss(workshop, avatar, package);
+  if (contains(workshop.recipe.rounded, identity.number))
+    row["rounding"] = rounding_loss(workshop, avatar, package);
   if (contains(workshop.recipe.frozen, identity.number)) {
-    train::TrainedAvatar frozen = train(workshop, data, state.frozen_run(name), Variant::kFrozenPose);
+    train::TrainedAvatar frozen =
+        train(workshop, data, state.frozen_run(name), Variant::kFrozenPose);
     row["frozen_pose"] = evaluate::evaluate_reconstruction(frozen, looking);
   }
   if (contains(workshop.recipe.scratch, identity.number)) {
-    train::TrainedAvatar scratch = train(workshop, data, state.scratch_run(name), Variant::kFromScratch);
+    train::TrainedAvatar scratch =
+        train(workshop, data, state.scratch_run(name), Variant::kFromScratch);
     row["from_scratch"] = {{"quality", evaluate::evaluate_reconstruction(scratch, looking)},
                            {"log", training_log(state.scratch_run(name))}};
     row["log"] = training_log(run);
   }
-  save(state.sheet(name), dataset::encode_jpeg(evaluate::make_contact_sheet(avatar, {.pairs = 3, .person_height_px = 320}), kSheetQuality));
+  save(state.sheet(name), dataset::encode_jpeg(evaluate::make_contact_sheet(
+                                                   avatar, {.pairs = 3, .person_height_px = 320}),
+                                               kSheetQuality));
   save(state.member(name), package);
   train::write_json(state.row(name), row);
   clean_up();

@@ -1,5 +1,6 @@
-// One member of a population, from nothing to its avatar package: its person is captured, its UNet trained from the shared initial weights,
-// measured against the truth, packed; then capture and run are removed.
+// One member of a population, from nothing to its avatar package: its person is captured, its UNet
+// trained from the shared initial weights, measured against the truth, packed; then capture and run
+// are removed.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -13,7 +14,8 @@
 
 namespace figurine::population {
 
-// What all members share. Borrowed; nothing in it belongs to LibTorch, so it can be made before processes are forked.
+// What all members share. Borrowed; nothing in it belongs to LibTorch, so it can be made before
+// processes are forked.
 struct Workshop {
   const Recipe& recipe;
   const State& state;
@@ -23,11 +25,13 @@ struct Workshop {
   std::string makehuman;
 };
 
-// Makes the capture of an identity in folder/ID, or finishes it. One thread. Throws InputError or Interrupted.
-void capture_identity(const Workshop& workshop, const Identity& identity, const std::string& folder);
+// Makes the capture of an identity in folder/ID, or finishes it. One thread. Throws InputError or
+// Interrupted.
+void capture_identity(const Workshop& workshop, const Identity& identity,
+                      const std::string& folder);
 
-// Makes the member, or goes on where it was interrupted, and returns its row: what members/ID.json holds. A member that is there already is
-// not made again. One thread.
+// Makes the member, or goes on where it was interrupted, and returns its row: what members/ID.json
+// holds. A member that is there already is not made again. One thread.
 nlohmann::json make_member(const Workshop& workshop, const Identity& identity);
 
 }  // namespace figurine::population

@@ -26,17 +26,21 @@ constexpr uint32_t kMostPeople = kMaxMembers;
 void allow_only(const JsonField& object, std::initializer_list<const char*> known) {
   if (!object.json().is_object()) object.fail("not an object");
   for (const auto& [key, value] : object.json().items()) {
-    if (std::find(known.begin(), known.end(), key) == known.end()) throw InputError(object.where() + ": " + key + ": unknown field");
+    if (std::find(known.begin(), known.end(), key) == known.end())
+      throw InputError(object.where() + ": " + key + ": unknown field");
   }
 }
 
 uint64_t whole(const JsonField& field, uint64_t least, uint64_t most) {
   const uint64_t value = field.whole();
-  if (value < least || value > most) field.fail("must lie in " + std::to_string(least) + " to " + std::to_string(most));
+  if (value < least || value > most)
+    field.fail("must lie in " + std::to_string(least) + " to " + std::to_string(most));
   return value;
 }
 
-uint32_t count(const JsonField& field, uint32_t least, uint32_t most) { return static_cast<uint32_t>(whole(field, least, most)); }
+uint32_t count(const JsonField& field, uint32_t least, uint32_t most) {
+  return static_cast<uint32_t>(whole(field, least, most));
+}
 
 double real(const JsonField& field, double least, double most) {
   const double value = field.number();
@@ -74,7 +78,8 @@ Split read_split_name(const JsonField& field) {
 }
 
 IdentityGroup read_group(const JsonField& json) {
-  allow_only(json, {"split", "first", "count", "outfits", "skins", "exclude_outfits", "exclude_skins"});
+  allow_only(json,
+             {"split", "first", "count", "outfits", "skins", "exclude_outfits", "exclude_skins"});
   IdentityGroup group{.split = read_split_name(json["split"]),
                       .first = count(json["first"], 0, 999999),
                       .count = count(json["count"], 1, kMostPeople),
@@ -88,7 +93,8 @@ IdentityGroup read_group(const JsonField& json) {
 }
 
 InitialWeightsRecipe read_initial(const JsonField& json) {
-  allow_only(json, {"identities", "rounds", "per_round", "iterations", "first_step", "last_step", "learning_rate", "standoff_weight"});
+  allow_only(json, {"identities", "rounds", "per_round", "iterations", "first_step", "last_step",
+                    "learning_rate", "standoff_weight"});
   InitialWeightsRecipe initial{.identities = count(json["identities"], 1, kMostPeople),
                                .rounds = count(json["rounds"], 0, 100000),
                                .iterations = whole(json["iterations"], 1, 1u << 24),
@@ -96,25 +102,30 @@ InitialWeightsRecipe read_initial(const JsonField& json) {
                                .last_step = real(json["last_step"], 0, 1)};
   if (json.has("per_round")) initial.per_round = count(json["per_round"], 1, 64);
   if (json.has("learning_rate")) initial.learning_rate = real(json["learning_rate"], 1e-9, 1);
-  if (json.has("standoff_weight")) initial.standoff_weight = static_cast<float>(real(json["standoff_weight"], 0, 1000));
+  if (json.has("standoff_weight"))
+    initial.standoff_weight = static_cast<float>(real(json["standoff_weight"], 0, 1000));
   return initial;
 }
 
 // What a recipe may say of training. All else is what `figurine-train avatar` does by default.
 train::TrainSettings read_training(const JsonField& json, const std::string& preset) {
-  allow_only(json, {"iterations", "views_per_pose", "poses", "learning_rate", "seed", "spacing_scale", "standoff_weight", "precision"});
+  allow_only(json, {"iterations", "views_per_pose", "poses", "learning_rate", "seed",
+                    "spacing_scale", "standoff_weight", "precision"});
   train::TrainSettings settings = train::preset_settings(preset);
   settings.schedule.budget = {.iterations = whole(json["iterations"], 1, 1u << 30), .seconds = 0};
   if (json.has("views_per_pose")) settings.views_per_pose = count(json["views_per_pose"], 1, 64);
   if (json.has("poses")) settings.poses_per_iteration = count(json["poses"], 1, 64);
   if (json.has("learning_rate")) settings.schedule.peak = real(json["learning_rate"], 1e-9, 1);
-  if (json.has("spacing_scale")) settings.decoding.spacing_scale = static_cast<float>(real(json["spacing_scale"], 0.05, 5));
-  if (json.has("standoff_weight")) settings.standoff_weight = static_cast<float>(real(json["standoff_weight"], 0, 1000));
+  if (json.has("spacing_scale"))
+    settings.decoding.spacing_scale = static_cast<float>(real(json["spacing_scale"], 0.05, 5));
+  if (json.has("standoff_weight"))
+    settings.standoff_weight = static_cast<float>(real(json["standoff_weight"], 0, 1000));
   if (json.has("seed")) settings.seed = json["seed"].whole();
   settings.bf16 = train::has_fast_bf16();
   if (json.has("precision")) {
     const std::string precision = json["precision"].text();
-    if (precision != "f32" && precision != "bf16") json["precision"].fail("'" + precision + "' is neither f32 nor bf16");
+    if (precision != "f32" && precision != "bf16")
+      json["precision"].fail("'" + precision + "' is neither f32 nor bf16");
     settings.bf16 = precision == "bf16";
   }
   settings.threads = 1;
@@ -136,27 +147,35 @@ void check_groups(const Recipe& recipe, const std::string& path) {
     has_train = has_train || group.split == Split::kTrain;
     for (uint32_t i = 0; i < group.count; ++i) {
       if (!seen.insert(group.first + i).second) {
-        throw InputError(path + ": groups: identity " + std::to_string(group.first + i) + " is in two of them");
+        throw InputError(path + ": groups: identity " + std::to_string(group.first + i) +
+                         " is in two of them");
       }
     }
   }
   if (!has_train) throw InputError(path + ": groups: none is of the part train");
-  if (seen.size() > kMostPeople) throw InputError(path + ": groups: more than " + std::to_string(kMostPeople) + " people");
+  if (seen.size() > kMostPeople)
+    throw InputError(path + ": groups: more than " + std::to_string(kMostPeople) + " people");
   for (const auto& [field, list] :
-       {std::pair{"frozen", &recipe.frozen}, std::pair{"scratch", &recipe.scratch}, std::pair{"rounded", &recipe.rounded}}) {
+       {std::pair{"frozen", &recipe.frozen}, std::pair{"scratch", &recipe.scratch},
+        std::pair{"rounded", &recipe.rounded}}) {
     for (uint32_t number : *list) {
-      if (!seen.contains(number)) throw InputError(path + ": " + field + ": identity " + std::to_string(number) + " is in no group");
+      if (!seen.contains(number))
+        throw InputError(path + ": " + field + ": identity " + std::to_string(number) +
+                         " is in no group");
     }
   }
   uint32_t training = 0;
-  for (const IdentityGroup& group : recipe.groups) training += group.split == Split::kTrain ? group.count : 0;
+  for (const IdentityGroup& group : recipe.groups)
+    training += group.split == Split::kTrain ? group.count : 0;
   if (recipe.initial.identities > training) {
-    throw InputError(path + ": initial_weights.identities: " + std::to_string(recipe.initial.identities) + " of " +
-                     std::to_string(training) + " training identities");
+    throw InputError(path +
+                     ": initial_weights.identities: " + std::to_string(recipe.initial.identities) +
+                     " of " + std::to_string(training) + " training identities");
   }
 }
 
-std::vector<std::string> only_test(const Recipe& recipe, std::vector<std::string> capture::WardrobeLimits::* excluded) {
+std::vector<std::string> only_test(const Recipe& recipe,
+                                   std::vector<std::string> capture::WardrobeLimits::* excluded) {
   std::optional<std::set<std::string>> common;  // of all groups that are not test
   for (const IdentityGroup& group : recipe.groups) {
     if (group.split == Split::kTest) continue;
@@ -167,7 +186,8 @@ std::vector<std::string> only_test(const Recipe& recipe, std::vector<std::string
     }
     common = std::move(both);
   }
-  return common ? std::vector<std::string>(common->begin(), common->end()) : std::vector<std::string>{};
+  return common ? std::vector<std::string>(common->begin(), common->end())
+                : std::vector<std::string>{};
 }
 
 }  // namespace
@@ -181,17 +201,19 @@ std::string Identity::name() const {
 Recipe read_recipe(const std::string& path) {
   const nlohmann::json text = train::read_json(path);
   const JsonField json(text, path);
-  allow_only(json, {"about", "name", "body", "preset", "seed", "motions", "capture", "groups", "initial_weights", "training", "package",
-                    "evaluation"});
+  allow_only(json, {"about", "name", "body", "preset", "seed", "motions", "capture", "groups",
+                    "initial_weights", "training", "package", "evaluation"});
   Recipe recipe;
   recipe.name = json["name"].text();
   if (json.has("body")) {
     const std::string body = json["body"].text();
-    if (body != "makehuman" && body != "mannequin") json["body"].fail("'" + body + "' is neither makehuman nor mannequin");
+    if (body != "makehuman" && body != "mannequin")
+      json["body"].fail("'" + body + "' is neither makehuman nor mannequin");
     recipe.mannequin = body == "mannequin";
   }
   recipe.seed = json["seed"].whole();
-  for (const JsonField& motion : json["motions"].items()) recipe.motions.push_back(read_motion(motion));
+  for (const JsonField& motion : json["motions"].items())
+    recipe.motions.push_back(read_motion(motion));
   if (recipe.motions.empty()) json["motions"].fail("is empty");
   read_capture(json["capture"], recipe);
   for (const JsonField& group : json["groups"].items()) recipe.groups.push_back(read_group(group));
@@ -207,7 +229,8 @@ Recipe read_recipe(const std::string& path) {
     if (evaluation.has("frozen")) recipe.frozen = numbers(evaluation["frozen"]);
     if (evaluation.has("scratch")) recipe.scratch = numbers(evaluation["scratch"]);
     if (evaluation.has("rounded")) recipe.rounded = numbers(evaluation["rounded"]);
-    if (evaluation.has("view_frame_step")) recipe.view_frame_step = count(evaluation["view_frame_step"], 1, 100000);
+    if (evaluation.has("view_frame_step"))
+      recipe.view_frame_step = count(evaluation["view_frame_step"], 1, 100000);
   }
   check_groups(recipe, path);
   return recipe;
@@ -216,15 +239,18 @@ Recipe read_recipe(const std::string& path) {
 std::vector<Identity> identities_of(const Recipe& recipe) {
   std::vector<Identity> all;
   for (const IdentityGroup& group : recipe.groups) {
-    for (uint32_t i = 0; i < group.count; ++i) all.push_back({.number = group.first + i, .split = group.split, .group = &group});
+    for (uint32_t i = 0; i < group.count; ++i)
+      all.push_back({.number = group.first + i, .split = group.split, .group = &group});
   }
   return all;
 }
 
 nlohmann::json split_of(const Recipe& recipe) {
   nlohmann::json split{{"recipe", recipe.name}, {"seed", recipe.seed}};
-  for (const Split part : {Split::kTrain, Split::kValidation, Split::kTest}) split[to_string(part)] = nlohmann::json::array();
-  for (const Identity& identity : identities_of(recipe)) split[to_string(identity.split)].push_back(identity.name());
+  for (const Split part : {Split::kTrain, Split::kValidation, Split::kTest})
+    split[to_string(part)] = nlohmann::json::array();
+  for (const Identity& identity : identities_of(recipe))
+    split[to_string(identity.split)].push_back(identity.name());
   split["only_test"] = {{"outfits", only_test(recipe, &capture::WardrobeLimits::excluded_outfits)},
                         {"skins", only_test(recipe, &capture::WardrobeLimits::excluded_skins)}};
   return split;
@@ -237,8 +263,9 @@ std::string find_clip(const std::string& clip, const std::string& recipe_path) {
   for (const fs::path& folder : folders) {
     if (fs::exists(folder / clip)) return (folder / clip).string();
   }
-  throw InputError(recipe_path + ": motions: " + clip + " is neither beside the recipe, nor in " + kCmuFolder +
-                   " (Debian package assimp-testmodels), nor in $FIGURINE_EMOTES" + (emotes == nullptr ? ", which is not set" : ""));
+  throw InputError(recipe_path + ": motions: " + clip + " is neither beside the recipe, nor in " +
+                   kCmuFolder + " (Debian package assimp-testmodels), nor in $FIGURINE_EMOTES" +
+                   (emotes == nullptr ? ", which is not set" : ""));
 }
 
 }  // namespace figurine::population

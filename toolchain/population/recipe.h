@@ -1,5 +1,6 @@
-// The recipe of a population: everything that decides its members, in one JSON file that is committed (docs/population.md). The same recipe
-// on the same kind of CPU gives the same weights to the bit.
+// The recipe of a population: everything that decides its members, in one JSON file that is
+// committed (docs/population.md). The same recipe on the same kind of CPU gives the same weights to
+// the bit.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@
 
 namespace figurine::population {
 
-// A piece of a clip. clip: a path, or a file name that is looked for among CMU's clips and the emotes (find_clip).
+// A piece of a clip. clip: a path, or a file name that is looked for among CMU's clips and the
+// emotes (find_clip).
 struct MotionPiece {
   std::string name, clip;
   std::optional<uint32_t> start, frames;
@@ -34,7 +36,8 @@ struct InitialWeightsRecipe {
   uint32_t rounds = 0;                   // 0: the common random weights are the initial ones
   uint32_t per_round = 2;                // identities fine-tuned in a round, side by side
   uint64_t iterations = 0;               // of a fine-tuning
-  double first_step = 0, last_step = 0;  // how far the weights move towards the fine-tuned ones, falling linearly over the rounds
+  double first_step = 0, last_step = 0;  // how far the weights move towards the fine-tuned ones,
+                                         // falling linearly over the rounds
   double learning_rate = 0;              // of a fine-tuning; training's if 0
   std::optional<float> standoff_weight;  // of a fine-tuning; training's if not given
 };
@@ -48,12 +51,17 @@ struct Recipe {
   capture::RigOptions rig;
   std::vector<IdentityGroup> groups;
   InitialWeightsRecipe initial;
-  train::TrainSettings training;  // preset included; .init is the place of the initial weights once they are there
-  uint32_t levels = kMostLevels;  // of the package's differences (population_writer.h); the members do not depend on it
-  std::vector<uint32_t> frozen;   // identities that are trained a second time with the body pose frozen, for comparison
-  std::vector<uint32_t> scratch;  // identities that are trained a second time from the common random weights, for comparison
+  train::TrainSettings
+      training;  // preset included; .init is the place of the initial weights once they are there
+  uint32_t levels = kMostLevels;  // of the package's differences (population_writer.h); the members
+                                  // do not depend on it
+  std::vector<uint32_t> frozen;   // identities that are trained a second time with the body pose
+                                  // frozen, for comparison
+  std::vector<uint32_t> scratch;  // identities that are trained a second time from the common
+                                  // random weights, for comparison
   std::vector<uint32_t> rounded;  // identities whose loss by the package's rounding is measured
-  uint32_t view_frame_step = 4;   // evaluation looks at every n-th training pose from held-out cameras
+  uint32_t view_frame_step =
+      4;  // evaluation looks at every n-th training pose from held-out cameras
 };
 
 struct Identity {
@@ -69,11 +77,12 @@ Recipe read_recipe(const std::string& path);
 // All identities in the order of their groups. Borrows the recipe.
 std::vector<Identity> identities_of(const Recipe& recipe);
 
-// {"train": [NAME...], "validation": [...], "test": [...], "only_test": {"outfits": [...], "skins": [...]}}: the form that
-// pack --population --split reads.
+// {"train": [NAME...], "validation": [...], "test": [...], "only_test": {"outfits": [...], "skins":
+// [...]}}: the form that pack --population --split reads.
 nlohmann::json split_of(const Recipe& recipe);
 
-// Looks beside the recipe, in Debian's assimp-testmodels and in $FIGURINE_EMOTES. InputError naming all of them.
+// Looks beside the recipe, in Debian's assimp-testmodels and in $FIGURINE_EMOTES. InputError naming
+// all of them.
 std::string find_clip(const std::string& clip, const std::string& recipe_path);
 
 }  // namespace figurine::population

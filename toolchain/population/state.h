@@ -1,11 +1,12 @@
 // The folder in which a population grows (docs/population.md):
 //
-//   recipe.json                the recipe, as it was when the folder was begun; another one is refused
-//   split.json                 who is in which part; written before anything is trained
+//   recipe.json                the recipe, as it was when the folder was begun; another one is
+//   refused split.json                 who is in which part; written before anything is trained
 //   body.fgn                   the body of all
-//   initial/                   the shared initial weights: weights.safetensors when they are done, history.csv, the rounds before
-//   captures/ID, runs/ID       while a member is made; removed when it is done
-//   members/ID.fgn, ID.json    the avatar (float weights, no picture) and what it was measured to be; ID.jpg: held-out pictures beside the
+//   initial/                   the shared initial weights: weights.safetensors when they are done,
+//   history.csv, the rounds before captures/ID, runs/ID       while a member is made; removed when
+//   it is done members/ID.fgn, ID.json    the avatar (float weights, no picture) and what it was
+//   measured to be; ID.jpg: held-out pictures beside the
 //                              truth
 //   members.csv                a table of all, written whenever one ends
 //   population.fgn             the package; written now and then, and at the end
@@ -26,12 +27,22 @@ struct State {
   std::string initial_weights() const { return initial() + "/weights.safetensors"; }
   std::string captures() const { return folder + "/captures"; }
   std::string run(const std::string& identity) const { return folder + "/runs/" + identity; }
-  std::string scratch_run(const std::string& identity) const { return folder + "/runs/" + identity + "_scratch"; }
-  std::string frozen_run(const std::string& identity) const { return folder + "/runs/" + identity + "_frozen"; }
+  std::string scratch_run(const std::string& identity) const {
+    return folder + "/runs/" + identity + "_scratch";
+  }
+  std::string frozen_run(const std::string& identity) const {
+    return folder + "/runs/" + identity + "_frozen";
+  }
   std::string members() const { return folder + "/members"; }
-  std::string member(const std::string& identity) const { return members() + "/" + identity + ".fgn"; }
-  std::string row(const std::string& identity) const { return members() + "/" + identity + ".json"; }
-  std::string sheet(const std::string& identity) const { return members() + "/" + identity + ".jpg"; }
+  std::string member(const std::string& identity) const {
+    return members() + "/" + identity + ".fgn";
+  }
+  std::string row(const std::string& identity) const {
+    return members() + "/" + identity + ".json";
+  }
+  std::string sheet(const std::string& identity) const {
+    return members() + "/" + identity + ".jpg";
+  }
   std::string table() const { return folder + "/members.csv"; }
   std::string package() const { return folder + "/population.fgn"; }
 };

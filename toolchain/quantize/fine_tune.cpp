@@ -32,7 +32,9 @@ bool goes_on(const std::string& folder, const std::string& scales, const nlohman
   return train::read_json(description).value("fine_tune", nlohmann::json()) == source;
 }
 
-train::TrainSettings fine_tune_settings(const train::TrainSettings& of_run, const std::string& weights, const FineTuneOptions& options) {
+train::TrainSettings fine_tune_settings(const train::TrainSettings& of_run,
+                                        const std::string& weights,
+                                        const FineTuneOptions& options) {
   train::TrainSettings settings = of_run;
   settings.init = weights;
   settings.schedule = {.peak = options.learning_rate,
@@ -48,7 +50,8 @@ train::TrainSettings fine_tune_settings(const train::TrainSettings& of_run, cons
 
 }  // namespace
 
-FineTuned fine_tune(train::TrainedAvatar& avatar, const train::RunDirectory& run, const FineTuneOptions& options) {
+FineTuned fine_tune(train::TrainedAvatar& avatar, const train::RunDirectory& run,
+                    const FineTuneOptions& options) {
   const train::RunDirectory tuned{run.path + "/qat"};
   const std::string scales_file = tuned.path + "/scales.safetensors";
   const train::RunDescription& description = avatar.description();
@@ -59,18 +62,21 @@ FineTuned fine_tune(train::TrainedAvatar& avatar, const train::RunDirectory& run
   if (!resume) {
     fs::remove_all(tuned.path);
     fs::create_directories(tuned.path);
-    save_scales(scales_file, choose_scales(network, observe_activations(avatar, options.calibration.poses), options.calibration));
+    save_scales(scales_file,
+                choose_scales(network, observe_activations(avatar, options.calibration.poses),
+                              options.calibration));
   }
   FineTuned result{tuned.weights(), load_scales(scales_file, network)};
-  const train::TrainRequest request{.data = description.data,
-                                    .body = description.body,
-                                    .run = tuned.path,
-                                    .settings = fine_tune_settings(description.settings, run.weights(), options),
-                                    .command = train::current_command(),
-                                    .resume = resume,
-                                    .quiet = options.quiet,
-                                    .fake_quantisation = fake_quantisation(result.scales),
-                                    .notes = {{"fine_tune", source}}};
+  const train::TrainRequest request{
+      .data = description.data,
+      .body = description.body,
+      .run = tuned.path,
+      .settings = fine_tune_settings(description.settings, run.weights(), options),
+      .command = train::current_command(),
+      .resume = resume,
+      .quiet = options.quiet,
+      .fake_quantisation = fake_quantisation(result.scales),
+      .notes = {{"fine_tune", source}}};
   train::train_avatar(request);
   return result;
 }

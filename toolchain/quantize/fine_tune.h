@@ -1,4 +1,5 @@
-// Quantisation-aware training: a short fine-tune of a finished run with fake quantisation on, in the trainer's own loop with its own loss.
+// Quantisation-aware training: a short fine-tune of a finished run with fake quantisation on, in
+// the trainer's own loop with its own loss.
 #pragma once
 
 #include <string>
@@ -20,8 +21,10 @@ struct FineTuned {
   Scales scales;        // the weights' own: calibrated before training and kept
 };
 
-// Trains RUN/qat, a run of its own that starts from RUN's weights; RUN's stay as they are. What an earlier call finished for the same
-// weights and options is used again, what it began is taken up, anything else there is thrown away. Throws as train_avatar.
-FineTuned fine_tune(train::TrainedAvatar& avatar, const train::RunDirectory& run, const FineTuneOptions& options);
+// Trains RUN/qat, a run of its own that starts from RUN's weights; RUN's stay as they are. What an
+// earlier call finished for the same weights and options is used again, what it began is taken up,
+// anything else there is thrown away. Throws as train_avatar.
+FineTuned fine_tune(train::TrainedAvatar& avatar, const train::RunDirectory& run,
+                    const FineTuneOptions& options);
 
 }  // namespace figurine::quantize

@@ -31,17 +31,22 @@ std::vector<uint32_t> scale_groups(const Network& network) {
   return parent;
 }
 
-std::vector<std::vector<float>> choose_weight_scales(const Network& network, const std::vector<Quantisation>& values, WeightRange range) {
+std::vector<std::vector<float>> choose_weight_scales(const Network& network,
+                                                     const std::vector<Quantisation>& values,
+                                                     WeightRange range) {
   std::vector<std::vector<float>> scales(network.layers.size());
   for_each_output(network, values, [&](size_t layer, size_t, const OutputWeights& output) {
-    const float scale = range == WeightRange::kMaxAbs ? max_abs_scale(output.weights) : smallest_error_scale(output.weights);
+    const float scale = range == WeightRange::kMaxAbs ? max_abs_scale(output.weights)
+                                                      : smallest_error_scale(output.weights);
     scales[layer].push_back(raise_weight_scale(scale, output));
   });
   return scales;
 }
 
-QuantisedNetwork::QuantisedNetwork(const Network& network, const Scales& scales) : values_(scales.values) {
-  throw_if_error(storage_.quantise(network, scales.values, scales.weight_scale), "quantised network");
+QuantisedNetwork::QuantisedNetwork(const Network& network, const Scales& scales)
+    : values_(scales.values) {
+  throw_if_error(storage_.quantise(network, scales.values, scales.weight_scale),
+                 "quantised network");
 }
 
 void imitate(const FixedPointNetwork& fixed, model::PoseUNet& unet) {
@@ -56,11 +61,13 @@ void imitate(const FixedPointNetwork& fixed, model::PoseUNet& unet) {
     scales.weight_scale[i].assign(convolution.weight_scale.begin(), convolution.weight_scale.end());
     const size_t per_output = convolution.weights.size() / convolution.bias.size();
     for (size_t k = 0; k < convolution.weights.size(); ++k) {
-      weights[i].push_back(static_cast<float>(convolution.weights[k]) * convolution.weight_scale[k / per_output]);
+      weights[i].push_back(static_cast<float>(convolution.weights[k]) *
+                           convolution.weight_scale[k / per_output]);
     }
     const float input_scale = fixed.values[network.layers[i].inputs[0]].scale;
     for (size_t o = 0; o < convolution.bias.size(); ++o) {
-      bias[i].push_back(static_cast<float>(convolution.bias[o]) * (convolution.weight_scale[o] * input_scale));
+      bias[i].push_back(static_cast<float>(convolution.bias[o]) *
+                        (convolution.weight_scale[o] * input_scale));
     }
     network.layers[i].weights = weights[i];
     network.layers[i].bias = bias[i];
@@ -75,7 +82,8 @@ std::shared_ptr<model::FakeQuantisation> fake_quantisation(const Scales& scales)
   fake->values = scales.values;
   fake->weight_scale.resize(layers);
   for (size_t i = 0; i < layers; ++i) {
-    if (!scales.weight_scale[i].empty()) fake->weight_scale[i] = torch::tensor(scales.weight_scale[i]);
+    if (!scales.weight_scale[i].empty())
+      fake->weight_scale[i] = torch::tensor(scales.weight_scale[i]);
   }
   fake->round_weights.assign(layers, true);
   fake->round_value.assign(layers, true);

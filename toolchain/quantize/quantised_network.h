@@ -16,8 +16,9 @@ class PoseUNet;
 
 namespace figurine::quantize {
 
-// Which values have to share one scale: max pool, upsample and concatenation hand on integers as they are, so their inputs and outputs are
-// one group. [layers + 1] the smallest value of each value's group.
+// Which values have to share one scale: max pool, upsample and concatenation hand on integers as
+// they are, so their inputs and outputs are one group. [layers + 1] the smallest value of each
+// value's group.
 std::vector<uint32_t> scale_groups(const Network& network);
 
 // All that calibration decides.
@@ -28,9 +29,12 @@ struct Scales {
 
 enum class WeightRange : uint8_t { kMaxAbs, kSmallestError };
 
-// One scale per output of every convolution. A scale is raised above its range's where fixed point needs it: all-zero weights, a bias that
-// is large against the weights, a multiplier below 2^-32. network: with weights.
-std::vector<std::vector<float>> choose_weight_scales(const Network& network, const std::vector<Quantisation>& values, WeightRange range);
+// One scale per output of every convolution. A scale is raised above its range's where fixed point
+// needs it: all-zero weights, a bias that is large against the weights, a multiplier below 2^-32.
+// network: with weights.
+std::vector<std::vector<float>> choose_weight_scales(const Network& network,
+                                                     const std::vector<Quantisation>& values,
+                                                     WeightRange range);
 
 // Weights and biases in integers, with their scales. Owns what FixedPointNetwork borrows.
 class QuantisedNetwork {
@@ -47,8 +51,8 @@ class QuantisedNetwork {
   FixedPointStorage storage_;
 };
 
-// Makes the UNet imitate a network in fixed point, a package's for example: its weights become the integers' real values. Throws InputError
-// if it is another shape's.
+// Makes the UNet imitate a network in fixed point, a package's for example: its weights become the
+// integers' real values. Throws InputError if it is another shape's.
 void imitate(const FixedPointNetwork& fixed, model::PoseUNet& unet);
 
 // The same arithmetic in the trainer's UNet, everything rounded.

@@ -16,7 +16,8 @@ constexpr int kSmallestActivationShare = 10;  // an activation's range is not cu
 constexpr int kSmallestWeightShare = 50;      // nor a weight's below a half
 constexpr float kStepsOfRange = float(kInt8Max - kInt8Min);
 
-// Calls score(share) for every candidate and returns the share with the smallest score; the larger one of equals.
+// Calls score(share) for every candidate and returns the share with the smallest score; the larger
+// one of equals.
 template <class Score>
 float best_share(int smallest, const Score& score) {
   float best = 1;
@@ -46,7 +47,9 @@ void Histogram::widen(float magnitude) {
   }
 }
 
-double Histogram::centre(size_t bin) const { return (2 * (static_cast<double>(bin) + 0.5) / kBins - 1) * limit_; }
+double Histogram::centre(size_t bin) const {
+  return (2 * (static_cast<double>(bin) + 0.5) / kBins - 1) * limit_;
+}
 
 void Histogram::add(std::span<const float> values) {
   if (values.empty()) return;
@@ -83,21 +86,24 @@ double Histogram::squared_error(const Range& range) const {
   for (size_t bin = 0; bin < bins_.size(); ++bin) {
     if (bins_[bin] == 0) continue;
     const double value = centre(bin);
-    const double difference = value - dequantise(quantise_int8(static_cast<float>(value), quantisation), quantisation);
+    const double difference =
+        value - dequantise(quantise_int8(static_cast<float>(value), quantisation), quantisation);
     error += static_cast<double>(bins_[bin]) * difference * difference;
   }
   return count_ == 0 ? 0 : error / static_cast<double>(count_);
 }
 
 Range Histogram::smallest_error() const {
-  const float share = best_share(kSmallestActivationShare, [&](float s) { return squared_error({s * low_, s * high_}); });
+  const float share = best_share(kSmallestActivationShare,
+                                 [&](float s) { return squared_error({s * low_, s * high_}); });
   return {share * low_, share * high_};
 }
 
 Quantisation quantisation_of(const Range& range) {
   FIG_CHECK(range.low <= 0 && range.high >= 0, "a range that contains zero");
   const float scale = (range.high - range.low) / kStepsOfRange;
-  if (!(scale >= std::numeric_limits<float>::min())) return {.scale = 1 / kStepsOfRange, .zero_point = kInt8Min};
+  if (!(scale >= std::numeric_limits<float>::min()))
+    return {.scale = 1 / kStepsOfRange, .zero_point = kInt8Min};
   const auto zero_point = static_cast<int32_t>(std::nearbyint(float(kInt8Min) - range.low / scale));
   return {.scale = scale, .zero_point = std::clamp(zero_point, kInt8Min, kInt8Max)};
 }
@@ -109,7 +115,8 @@ float smallest_error_scale(std::span<const float> weights) {
            const float scale = whole * share;
            double error = 0;
            for (float weight : weights) {
-             const double steps = clamp_and_round(weight / scale, -float(kWeightMax), float(kWeightMax));
+             const double steps =
+                 clamp_and_round(weight / scale, -float(kWeightMax), float(kWeightMax));
              error += (weight - steps * scale) * (weight - steps * scale);
            }
            return error;

@@ -17,7 +17,9 @@ AvatarFile open_avatar(const std::string& name) {
   AvatarFile opened{open_package(name.substr(0, hash), PackageKind::kPopulation), {}, {}};
   const Population& population = opened.file.package.population();
   const std::optional<size_t> member = find_member(population, name.substr(hash + 1));
-  if (!member) throw InputError(opened.file.path + ": member '" + name.substr(hash + 1) + "': there is none of this name or number");
+  if (!member)
+    throw InputError(opened.file.path + ": member '" + name.substr(hash + 1) +
+                     "': there is none of this name or number");
   opened.storage.resize(member_floats(population));
   opened.avatar = open_member(population, *member, opened.storage);
   return opened;

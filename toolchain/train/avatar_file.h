@@ -1,4 +1,5 @@
-// An avatar on disk: a package of its own, or a member of a population ("people.fgn#NAME", "people.fgn#17").
+// An avatar on disk: a package of its own, or a member of a population ("people.fgn#NAME",
+// "people.fgn#17").
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
-// One person's model as the trainer holds it: a pose goes in, the UNet's input and the skinning transforms come out; from the UNet's
-// output, Gaussians and pictures. The trainer, the evaluation, the golden frame and the parity check all go through here, so they cannot
-// differ.
+// One person's model as the trainer holds it: a pose goes in, the UNet's input and the skinning
+// transforms come out; from the UNet's output, Gaussians and pictures. The trainer, the evaluation,
+// the golden frame and the parity check all go through here, so they cannot differ.
 #pragma once
 
 #include <torch/torch.h>
@@ -20,13 +20,15 @@ namespace figurine::train {
 
 // What a pose becomes before any network.
 struct PosedBody {
-  torch::Tensor input;                  // [T,T,Cin] float: standardised maps, Fourier channels behind them
-  std::vector<Affine> world_from_rest;  // [J] skinning transforms of the template that the Gaussians sit on
+  torch::Tensor input;  // [T,T,Cin] float: standardised maps, Fourier channels behind them
+  std::vector<Affine>
+      world_from_rest;  // [J] skinning transforms of the template that the Gaussians sit on
 };
 
 class AvatarModel {
  public:
-  // body is borrowed. Throws InputError if it does not fit the settings: another T, fewer shape coefficients than the person has.
+  // body is borrowed. Throws InputError if it does not fit the settings: another T, fewer shape
+  // coefficients than the person has.
   AvatarModel(const Body& body, std::vector<float> shape, const TrainSettings& settings, bool bf16);
 
   const Body& body() const { return body_; }
@@ -37,8 +39,8 @@ class AvatarModel {
   const model::PoseUNet& unet() const { return unet_; }
   model::AvatarRenderer& renderer() { return renderer_; }
 
-  // The pose that puts this model's root where the captured person's root was. The two differ by the rest positions of the mean and of the
-  // person's own root, and only for the mean template.
+  // The pose that puts this model's root where the captured person's root was. The two differ by
+  // the rest positions of the mean and of the person's own root, and only for the mean template.
   OwnedPose from_capture(const dataset::CaptureFrame& frame) const;
 
   // May be called from several threads.
@@ -53,7 +55,8 @@ class AvatarModel {
   // [4,H,W] premultiplied colour and alpha of the whole image, without gradient.
   torch::Tensor render(const torch::Tensor& head, const PosedBody& posed, const Camera& camera);
   // [H,W,4], the same.
-  std::vector<float> render_rgba(const torch::Tensor& head, const PosedBody& posed, const Camera& camera);
+  std::vector<float> render_rgba(const torch::Tensor& head, const PosedBody& posed,
+                                 const Camera& camera);
 
  private:
   const Body& body_;

@@ -1,11 +1,13 @@
-// Ctrl-C as a flag: long work looks at it between steps, saves its state and throws Interrupted. A second Ctrl-C ends the process at once.
+// Ctrl-C as a flag: long work looks at it between steps, saves its state and throws Interrupted. A
+// second Ctrl-C ends the process at once.
 #pragma once
 
 #include <stdexcept>
 
 namespace figurine::train {
 
-// Stopped by the user; what was done is saved. toolchain/cli turns it into exit code 130 (128 + SIGINT, as shells expect).
+// Stopped by the user; what was done is saved. toolchain/cli turns it into exit code 130 (128 +
+// SIGINT, as shells expect).
 class Interrupted : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

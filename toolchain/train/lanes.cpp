@@ -4,7 +4,8 @@ namespace figurine::train {
 
 Lanes::Lanes(unsigned count, const std::function<void()>& begin) {
   for (unsigned lane = 1; lane < count; ++lane) workers_.push_back(std::make_unique<Worker>());
-  for (unsigned lane = 1; lane < count; ++lane) workers_[lane - 1]->thread = std::thread([this, lane, begin] { work(lane, begin); });
+  for (unsigned lane = 1; lane < count; ++lane)
+    workers_[lane - 1]->thread = std::thread([this, lane, begin] { work(lane, begin); });
 }
 
 Lanes::~Lanes() {

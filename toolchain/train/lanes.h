@@ -1,7 +1,9 @@
-// A fixed crew of threads that do the same step side by side, again and again: lane 0 is the caller.
+// A fixed crew of threads that do the same step side by side, again and again: lane 0 is the
+// caller.
 //
-// Several poses of one iteration run this way, each on a thread of its own from forward to backward: the UNet's convolutions are too small
-// for LibTorch to gain from a second thread inside of them.
+// Several poses of one iteration run this way, each on a thread of its own from forward to
+// backward: the UNet's convolutions are too small for LibTorch to gain from a second thread inside
+// of them.
 #pragma once
 
 #include <exception>
@@ -21,7 +23,8 @@ class Lanes {
   Lanes(const Lanes&) = delete;
   Lanes& operator=(const Lanes&) = delete;
 
-  // step(lane) for every lane at the same time; returns when all are done. The exception of the lowest lane that threw is thrown again.
+  // step(lane) for every lane at the same time; returns when all are done. The exception of the
+  // lowest lane that threw is thrown again.
   void run(const std::function<void(unsigned)>& step);
 
  private:

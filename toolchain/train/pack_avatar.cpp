@@ -13,19 +13,21 @@ namespace figurine::train {
 
 namespace {
 
-constexpr uint32_t kBodyJoints = 21;         // SMPL-X joints 1..21: body without root, hands and face
+constexpr uint32_t kBodyJoints = 21;  // SMPL-X joints 1..21: body without root, hands and face
 constexpr double kPoseDeviation_rad = 0.03;  // added to every feature's spread
 constexpr uint32_t kGoldenSize_px = 256;
 constexpr std::array<float, 3> kGoldenBackground{0.5f, 0.5f, 0.5f};
 
 std::vector<std::byte> golden_png(TrainedAvatar& avatar, const GoldenView& view) {
   const PosedBody posed = avatar.model().pose(view.pose.view());
-  const std::vector<float> rgba = avatar.model().render_rgba(avatar.model().evaluate(posed), posed, view.camera);
+  const std::vector<float> rgba =
+      avatar.model().render_rgba(avatar.model().evaluate(posed), posed, view.camera);
   ports::ImageU8 image(view.camera.width_px, view.camera.height_px, 3);
   for (size_t pixel = 0; pixel < rgba.size() / 4; ++pixel) {
     for (size_t c = 0; c < 3; ++c) {
       const float value = rgba[4 * pixel + c] + (1 - rgba[4 * pixel + 3]) * kGoldenBackground[c];
-      image.pixels[3 * pixel + c] = static_cast<uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255.0f + 0.5f);
+      image.pixels[3 * pixel + c] =
+          static_cast<uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255.0f + 0.5f);
     }
   }
   return value_or_throw(ports::encode_png(image), "golden frame");
@@ -57,7 +59,8 @@ std::vector<QualityMetric> read_quality(const RunDirectory& run) {
     const auto found = report.find(group);
     if (found == report.end() || !found->is_object()) return;
     const auto value = found->find(metric);
-    if (value != found->end() && value->is_number()) quality.push_back({name, value->get<double>()});
+    if (value != found->end() && value->is_number())
+      quality.push_back({name, value->get<double>()});
   };
   add("psnr_view_db", "held_out_views", "psnr_db");
   add("psnr_pose_db", "held_out_poses", "psnr_db");
@@ -67,31 +70,46 @@ std::vector<QualityMetric> read_quality(const RunDirectory& run) {
   return quality;
 }
 
-Provenance make_provenance(const TrainedAvatar& avatar, const RunDirectory& run, const PackOptions& options) {
+Provenance make_provenance(const TrainedAvatar& avatar, const RunDirectory& run,
+                           const PackOptions& options) {
   const nlohmann::json& json = avatar.description().json;
-  const bool synthetic = !avatar.data().sources().empty();  // only figurine's own captures state their sources
+  const bool synthetic =
+      !avatar.data().sources().empty();  // only figurine's own captures state their sources
   if (!synthetic && (options.licence_name.empty() || options.depicted_person.empty())) {
-    throw InputError(run.path + ": shows a real person: say --licence and --depicted-person (how consent was given)");
+    throw InputError(
+        run.path +
+        ": shows a real person: say --licence and --depicted-person (how consent was given)");
   }
-  const auto or_default = [](const std::string& given, const char* fallback) { return given.empty() ? std::string(fallback) : given; };
-  Provenance provenance{.tool = "figurine-train " FIGURINE_VERSION, .created = utc_now().substr(0, 10)};
+  const auto or_default = [](const std::string& given, const char* fallback) {
+    return given.empty() ? std::string(fallback) : given;
+  };
+  Provenance provenance{.tool = "figurine-train " FIGURINE_VERSION,
+                        .created = utc_now().substr(0, 10)};
   provenance.sources = avatar.data().sources();
   provenance.licence_name = or_default(options.licence_name, "CC0-1.0");
-  provenance.licence_url = options.licence_name.empty() ? "https://creativecommons.org/publicdomain/zero/1.0/" : options.licence_url;
+  provenance.licence_url = options.licence_name.empty()
+                               ? "https://creativecommons.org/publicdomain/zero/1.0/"
+                               : options.licence_url;
   provenance.authors = options.authors;
-  provenance.avatar_permission = or_default(options.avatar_permission, synthetic ? "everyone" : "onlyAuthor");
-  provenance.commercial_usage = or_default(options.commercial_usage, synthetic ? "corporation" : "personalNonProfit");
+  provenance.avatar_permission =
+      or_default(options.avatar_permission, synthetic ? "everyone" : "onlyAuthor");
+  provenance.commercial_usage =
+      or_default(options.commercial_usage, synthetic ? "corporation" : "personalNonProfit");
   provenance.depicted_person = or_default(options.depicted_person, "synthetic");
-  for (const char* key : {"command", "commit"}) provenance.settings.push_back({key, text_of(json, key)});
+  for (const char* key : {"command", "commit"})
+    provenance.settings.push_back({key, text_of(json, key)});
   nlohmann::json said = to_json(avatar.description().settings);
-  said["init"] = std::filesystem::path(avatar.description().settings.init).filename().string();  // folders mean nothing elsewhere
+  said["init"] = std::filesystem::path(avatar.description().settings.init)
+                     .filename()
+                     .string();  // folders mean nothing elsewhere
   flatten(said, "", provenance.settings);
   for (const char* key : {"iterations", "train_seconds"}) {
     if (json.contains(key)) provenance.settings.push_back({key, json.at(key).dump()});
   }
   if (json.contains("data") && json.at("data").contains("seed"))
     provenance.settings.push_back({"data.seed", json.at("data").at("seed").dump()});
-  provenance.settings.insert(provenance.settings.end(), options.settings.begin(), options.settings.end());
+  provenance.settings.insert(provenance.settings.end(), options.settings.begin(),
+                             options.settings.end());
   provenance.quality = read_quality(run);
   return provenance;
 }
@@ -129,10 +147,12 @@ PoseFeatures pose_features(const std::vector<std::vector<float>>& rotations, uin
   for (const std::vector<double>& row : rows) {
     for (size_t i = 0; i < size; ++i) {
       for (size_t k = 0; k < size; ++k)
-        covariance[i * size + k] += (row[i] - mean[i]) * (row[k] - mean[k]) / static_cast<double>(rows.size());
+        covariance[i * size + k] +=
+            (row[i] - mean[i]) * (row[k] - mean[k]) / static_cast<double>(rows.size());
     }
   }
-  for (size_t i = 0; i < size; ++i) covariance[i * size + i] += kPoseDeviation_rad * kPoseDeviation_rad;
+  for (size_t i = 0; i < size; ++i)
+    covariance[i * size + i] += kPoseDeviation_rad * kPoseDeviation_rad;
   features.mean.assign(mean.begin(), mean.end());
   features.covariance.assign(covariance.begin(), covariance.end());
   return features;
@@ -147,16 +167,22 @@ GoldenView choose_golden_view(const TrainedAvatar& avatar) {
   const size_t frame = block.empty() ? data.frames().size() / 2 : block[block.size() / 2];
   GoldenView view{avatar.model().from_capture(data.frames()[frame]), data.cameras().front().camera};
   Camera& camera = view.camera;
-  const float shrink = std::min(1.0f, float(kGoldenSize_px) / float(std::max(camera.width_px, camera.height_px)));
+  const float shrink =
+      std::min(1.0f, float(kGoldenSize_px) / float(std::max(camera.width_px, camera.height_px)));
   camera.width_px = std::max(1u, static_cast<uint32_t>(float(camera.width_px) * shrink));
   camera.height_px = std::max(1u, static_cast<uint32_t>(float(camera.height_px) * shrink));
-  for (float* value : {&camera.fx_px, &camera.fy_px, &camera.cx_px, &camera.cy_px}) *value *= shrink;
+  for (float* value : {&camera.fx_px, &camera.fy_px, &camera.cx_px, &camera.cy_px})
+    *value *= shrink;
   return view;
 }
 
-std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& run, const PackOptions& options) {
+std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& run,
+                                   const PackOptions& options) {
   const TrainSettings& settings = avatar.description().settings;
-  if (settings.freeze_pose) throw InputError(run.path + ": was trained with a frozen body pose, an experiment that no device can repeat");
+  if (settings.freeze_pose)
+    throw InputError(
+        run.path +
+        ": was trained with a frozen body pose, an experiment that no device can repeat");
   std::vector<float> storage;
   Network network = avatar.model().unet().export_network(storage);
   const std::vector<ValueShape> shapes = value_or_throw(infer_shapes(network, true), run.path);
@@ -170,9 +196,12 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   }
   const PoseFeatures features = pose_features(rotations, avatar.body().joint_count());
   const GoldenView view = choose_golden_view(avatar);
-  const std::vector<std::byte> png = options.golden && options.float_weights ? golden_png(avatar, view) : std::vector<std::byte>{};
+  const std::vector<std::byte> png =
+      options.golden && options.float_weights ? golden_png(avatar, view) : std::vector<std::byte>{};
 
-  Avatar content{.name = options.name.empty() ? std::filesystem::path(avatar.data().directory()).filename().string() : options.name,
+  Avatar content{.name = options.name.empty()
+                             ? std::filesystem::path(avatar.data().directory()).filename().string()
+                             : options.name,
                  .body_name = avatar.body().name,
                  .body_hash = avatar.body_file().package.content_hash(),
                  .preset = settings.preset,
@@ -194,7 +223,8 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
                                 .macs_per_frame = count_macs(network, shapes),
                                 .gaussians = avatar.body().texel_count()};
-  return value_or_throw(write_package(content, budget, make_provenance(avatar, run, options)), run.path);
+  return value_or_throw(write_package(content, budget, make_provenance(avatar, run, options)),
+                        run.path);
 }
 
 }  // namespace figurine::train

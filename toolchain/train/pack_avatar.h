@@ -1,5 +1,5 @@
-// A run as an avatar package: network, decoding, shape, how unusual a pose is, where it all came from, and a golden frame to test a device
-// against.
+// A run as an avatar package: network, decoding, shape, how unusual a pose is, where it all came
+// from, and a golden frame to test a device against.
 #pragma once
 
 #include <string>
@@ -12,31 +12,33 @@
 namespace figurine::train {
 
 struct PackOptions {
-  std::string name;                                // empty: the data folder's name
-  bool golden = true;                              // an expected picture of the float weights
-  uint64_t peak_memory_bytes = 0;                  // what the runtime needs for one instance; 0: not known yet
-  bool float_weights = true;                       // may be left out if there is fixed_point
-  FixedPointNetwork fixed_point;                   // borrowed; empty: none
+  std::string name;                // empty: the data folder's name
+  bool golden = true;              // an expected picture of the float weights
+  uint64_t peak_memory_bytes = 0;  // what the runtime needs for one instance; 0: not known yet
+  bool float_weights = true;       // may be left out if there is fixed_point
+  FixedPointNetwork fixed_point;   // borrowed; empty: none
   std::array<uint64_t, 2> fixed_point_hash{0, 0};  // of the golden frame; zero: not known yet
   std::string fixed_point_library;                 // that it was made with
   std::vector<KeyValue> settings;                  // behind the run's own in the provenance
-  // Licence and consent. Empty fields are filled in for captures of figurine's own (synthetic persons): CC0-1.0, everyone, corporation,
-  // "synthetic". For anybody else licence_name and depicted_person have to be given.
+  // Licence and consent. Empty fields are filled in for captures of figurine's own (synthetic
+  // persons): CC0-1.0, everyone, corporation, "synthetic". For anybody else licence_name and
+  // depicted_person have to be given.
   std::string licence_name, licence_url;
   std::string avatar_permission, commercial_usage, depicted_person;
   std::vector<std::string> authors;
 };
 
-// The pose and the camera of the golden frame: the middle of the held-out block (of the training poses if nothing is held out), seen by the
-// first camera at 256 pixels or less a side.
+// The pose and the camera of the golden frame: the middle of the held-out block (of the training
+// poses if nothing is held out), seen by the first camera at 256 pixels or less a side.
 struct GoldenView {
   OwnedPose pose;
   Camera camera;
 };
 GoldenView choose_golden_view(const TrainedAvatar& avatar);
 
-// Features of PoseStatistics: rotation vectors of the 21 SMPL-X body joints, fewer for a smaller skeleton. covariance: [3P,3P], plus (0.03
-// rad)^2 on the diagonal, so that a joint that never moved in training still has a scale. poses: [F] of J rotations each.
+// Features of PoseStatistics: rotation vectors of the 21 SMPL-X body joints, fewer for a smaller
+// skeleton. covariance: [3P,3P], plus (0.03 rad)^2 on the diagonal, so that a joint that never
+// moved in training still has a scale. poses: [F] of J rotations each.
 struct PoseFeatures {
   std::vector<uint8_t> joints;
   std::vector<float> mean, covariance;
@@ -46,7 +48,9 @@ PoseFeatures pose_features(const std::vector<std::vector<float>>& rotations, uin
 // The rotation vector (axis times angle, at most pi long) of a quaternion of any length, wxyz.
 std::array<double, 3> rotation_vector(const float* wxyz);
 
-// The package's bytes. Throws InputError: a run with frozen pose (a device always poses), missing consent, no weights.
-std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& run, const PackOptions& options);
+// The package's bytes. Throws InputError: a run with frozen pose (a device always poses), missing
+// consent, no weights.
+std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& run,
+                                   const PackOptions& options);
 
 }  // namespace figurine::train

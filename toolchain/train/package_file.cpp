@@ -11,7 +11,9 @@ PackageFile open_package(const std::string& path, PackageKind kind) {
   if (!bytes.ok()) throw InputError(bytes.status().message());
   Result<Package> package = Package::open(bytes->bytes(), path);
   if (!package.ok()) throw InputError(package.status().message());
-  if (package->kind() != kind) throw InputError(path + ": is a package of kind " + to_string(package->kind()) + ", not " + to_string(kind));
+  if (package->kind() != kind)
+    throw InputError(path + ": is a package of kind " + to_string(package->kind()) + ", not " +
+                     to_string(kind));
   return {path, std::move(bytes).value(), std::move(package).value()};
 }
 

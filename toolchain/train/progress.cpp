@@ -14,7 +14,9 @@ constexpr double kTerminalPeriod_s = 0.2;
 constexpr double kPlainPeriod_s = 15;
 constexpr int kBarCells = 20;
 
-double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 }  // namespace
 
@@ -29,7 +31,8 @@ std::string format_duration(double seconds) {
   return text;
 }
 
-Progress::Progress(std::string title, bool quiet) : title_(std::move(title)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {
+Progress::Progress(std::string title, bool quiet)
+    : title_(std::move(title)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {
   if (!terminal_) last_shown_s_ = now_s();  // the first plain line comes after one period
 }
 
@@ -37,13 +40,16 @@ Progress::~Progress() {
   if (open_line_) std::fputc('\n', stderr);
 }
 
-bool Progress::due() const { return !quiet_ && now_s() - last_shown_s_ >= (terminal_ ? kTerminalPeriod_s : kPlainPeriod_s); }
+bool Progress::due() const {
+  return !quiet_ && now_s() - last_shown_s_ >= (terminal_ ? kTerminalPeriod_s : kPlainPeriod_s);
+}
 
 void Progress::show(double fraction, const TrainingLine& line) {
   if (!due()) return;
   char text[256];
-  std::snprintf(text, sizeof(text), "%llu  loss %.4f  PSNR %.2f dB  %.1f it/s  %s left", static_cast<unsigned long long>(line.iteration),
-                line.loss, line.psnr_db, line.iterations_per_second, format_duration(line.seconds_left).c_str());
+  std::snprintf(text, sizeof(text), "%llu  loss %.4f  PSNR %.2f dB  %.1f it/s  %s left",
+                static_cast<unsigned long long>(line.iteration), line.loss, line.psnr_db,
+                line.iterations_per_second, format_duration(line.seconds_left).c_str());
   show(fraction, std::string(text));
 }
 
@@ -56,7 +62,8 @@ void Progress::show(double fraction, const std::string& text) {
   }
   std::string bar(kBarCells, '.');
   for (int i = 0; i < kBarCells && i < fraction * kBarCells; ++i) bar[static_cast<size_t>(i)] = '#';
-  std::fprintf(stderr, "\r%s [%s] %3.0f %%  %s\x1b[K", title_.c_str(), bar.c_str(), 100 * fraction, text.c_str());
+  std::fprintf(stderr, "\r%s [%s] %3.0f %%  %s\x1b[K", title_.c_str(), bar.c_str(), 100 * fraction,
+               text.c_str());
   std::fflush(stderr);
   open_line_ = true;
 }

@@ -1,4 +1,5 @@
-// What training shows while it runs: one line that rewrites itself on a terminal, one plain line about every fifteen seconds elsewhere.
+// What training shows while it runs: one line that rewrites itself on a terminal, one plain line
+// about every fifteen seconds elsewhere.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +24,8 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  // fraction: of the work, in [0,1]. Called as often as the caller likes; prints a few times a second at most.
+  // fraction: of the work, in [0,1]. Called as often as the caller likes; prints a few times a
+  // second at most.
   void show(double fraction, const TrainingLine& line);
   void show(double fraction, const std::string& text);
   // A line of its own, above the bar.

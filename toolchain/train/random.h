@@ -1,7 +1,8 @@
-// Random numbers as a function of (seed, stream, counter): no state to save, so a resumed run draws what an uninterrupted one draws.
+// Random numbers as a function of (seed, stream, counter): no state to save, so a resumed run draws
+// what an uninterrupted one draws.
 //
-// Based on: Steele, Lea, Flood, Fast Splittable Pseudorandom Number Generators, 2014 (the finaliser of SplitMix64, applied to a Weyl
-// sequence).
+// Based on: Steele, Lea, Flood, Fast Splittable Pseudorandom Number Generators, 2014 (the finaliser
+// of SplitMix64, applied to a Weyl sequence).
 #pragma once
 
 #include <cstddef>
@@ -15,8 +16,8 @@ uint64_t random_bits(uint64_t seed, uint64_t stream, uint64_t counter);
 // Uniform in [0,1), 24 bits.
 float random_unit(uint64_t seed, uint64_t stream, uint64_t counter);
 
-// The order in which training visits `count` items: every epoch a fresh permutation, drawn from (seed, epoch). item(i) depends on i alone;
-// the permutation of the last epoch asked for is kept.
+// The order in which training visits `count` items: every epoch a fresh permutation, drawn from
+// (seed, epoch). item(i) depends on i alone; the permutation of the last epoch asked for is kept.
 class ShuffledOrder {
  public:
   ShuffledOrder(uint64_t seed, size_t count);

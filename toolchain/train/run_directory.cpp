@@ -23,7 +23,9 @@ namespace {
 
 constexpr char kLogHeader[] = "iteration,seconds,learning_rate,loss,psnr_db\n";
 
-std::span<const std::byte> bytes_of(const std::string& text) { return {reinterpret_cast<const std::byte*>(text.data()), text.size()}; }
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::byte*>(text.data()), text.size()};
+}
 
 void write_text(const std::string& path, const std::string& text) {
   throw_if_error(ports::write_file_atomically(path, bytes_of(text)), "cannot save");
@@ -36,13 +38,15 @@ std::string exact(double value) {
   return {text, end.ptr};
 }
 
-double parse_double(const std::string& path, const std::map<std::string, std::string>& metadata, const std::string& key) {
+double parse_double(const std::string& path, const std::map<std::string, std::string>& metadata,
+                    const std::string& key) {
   const auto found = metadata.find(key);
   double value = 0;
   if (found == metadata.end()) throw InputError(path + ": " + key + ": missing");
   const std::string& text = found->second;
   const auto end = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (end.ec != std::errc{} || end.ptr != text.data() + text.size() || !(value >= 0) || value > 1e15) {
+  if (end.ec != std::errc{} || end.ptr != text.data() + text.size() || !(value >= 0) ||
+      value > 1e15) {
     throw InputError(path + ": " + key + ": \"" + text + "\" is no sound number");
   }
   return value;
@@ -57,7 +61,8 @@ void add_weights(const model::PoseUNet& unet, TensorFile& file) {
     const std::string name = "layer." + std::to_string(conv++);
     const int64_t out = layer.out_channels, kernel = layer.kernel;
     const int64_t in = static_cast<int64_t>(layer.weights.size()) / (out * kernel * kernel);
-    file.tensors[name + ".weight"] = {{out, kernel, kernel, in}, {layer.weights.begin(), layer.weights.end()}};
+    file.tensors[name + ".weight"] = {{out, kernel, kernel, in},
+                                      {layer.weights.begin(), layer.weights.end()}};
     file.tensors[name + ".bias"] = {{out}, {layer.bias.begin(), layer.bias.end()}};
   }
 }
@@ -76,8 +81,11 @@ void take_weights(const std::string& path, const TensorFile& file, model::PoseUN
       std::span<const float>& values = is_bias ? layer.bias : layer.weights;
       const int64_t out = layer.out_channels, kernel = layer.kernel;
       const std::vector<int64_t> shape =
-          is_bias ? std::vector<int64_t>{out} : std::vector<int64_t>{out, kernel, kernel, int64_t(values.size()) / (out * kernel * kernel)};
-      if (found->second.shape != shape) throw InputError(path + ": " + field + ": is of another shape than this run's network");
+          is_bias ? std::vector<int64_t>{out}
+                  : std::vector<int64_t>{out, kernel, kernel,
+                                         int64_t(values.size()) / (out * kernel * kernel)};
+      if (found->second.shape != shape)
+        throw InputError(path + ": " + field + ": is of another shape than this run's network");
       values = found->second.values;
     }
   }
@@ -89,11 +97,14 @@ NamedTensor named(const torch::Tensor& tensor) {
   return {{tensor.numel()}, {data, data + tensor.numel()}};
 }
 
-void take_moment(const std::string& path, const TensorFile& file, const std::string& name, torch::Tensor& moment) {
+void take_moment(const std::string& path, const TensorFile& file, const std::string& name,
+                 torch::Tensor& moment) {
   const auto found = file.tensors.find(name);
   if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
-  if (found->second.values.size() != static_cast<size_t>(moment.numel())) throw InputError(path + ": " + name + ": is of another size");
-  std::memcpy(moment.data_ptr<float>(), found->second.values.data(), found->second.values.size() * sizeof(float));
+  if (found->second.values.size() != static_cast<size_t>(moment.numel()))
+    throw InputError(path + ": " + name + ": is of another size");
+  std::memcpy(moment.data_ptr<float>(), found->second.values.data(),
+              found->second.values.size() * sizeof(float));
 }
 
 struct StageField {
@@ -117,11 +128,13 @@ void save_weights(const RunDirectory& run, const model::PoseUNet& unet) {
 }
 
 void load_weights(const std::string& path, model::PoseUNet& unet) {
-  const std::string file = std::filesystem::is_directory(path) ? RunDirectory{path}.weights() : path;
+  const std::string file =
+      std::filesystem::is_directory(path) ? RunDirectory{path}.weights() : path;
   take_weights(file, read_tensor_file(file), unet);
 }
 
-void save_checkpoint(const RunDirectory& run, const TrainingState& state, const model::PoseUNet& unet, const model::Optimiser& optimiser) {
+void save_checkpoint(const RunDirectory& run, const TrainingState& state,
+                     const model::PoseUNet& unet, const model::Optimiser& optimiser) {
   TensorFile file;
   add_weights(unet, file);
   file.tensors["optimiser.first_moment"] = named(optimiser.first_moment);
@@ -129,17 +142,20 @@ void save_checkpoint(const RunDirectory& run, const TrainingState& state, const 
   file.metadata["iteration"] = exact(static_cast<double>(state.iteration));
   file.metadata["seconds"] = exact(state.seconds);
   file.metadata["optimiser_steps"] = exact(static_cast<double>(optimiser.steps));
-  for (const StageField& field : kStageFields) file.metadata[field.name] = exact(state.stages.*field.member);
+  for (const StageField& field : kStageFields)
+    file.metadata[field.name] = exact(state.stages.*field.member);
   write_tensor_file(run.checkpoint(), file);
 }
 
-TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, model::Optimiser& optimiser) {
+TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet,
+                              model::Optimiser& optimiser) {
   const std::string path = run.checkpoint();
   const TensorFile file = read_tensor_file(path);
   TrainingState state;
   state.iteration = static_cast<uint64_t>(parse_double(path, file.metadata, "iteration"));
   state.seconds = parse_double(path, file.metadata, "seconds");
-  for (const StageField& field : kStageFields) state.stages.*field.member = parse_double(path, file.metadata, field.name);
+  for (const StageField& field : kStageFields)
+    state.stages.*field.member = parse_double(path, file.metadata, field.name);
   take_weights(path, file, unet);
   take_moment(path, file, "optimiser.first_moment", optimiser.first_moment);
   take_moment(path, file, "optimiser.second_moment", optimiser.second_moment);
@@ -151,8 +167,9 @@ void save_log(const RunDirectory& run, const std::vector<LogRow>& rows) {
   std::string text = kLogHeader;
   for (const LogRow& row : rows) {
     char line[160];
-    std::snprintf(line, sizeof(line), "%llu,%.3f,%.6g,%.6f,%.3f\n", static_cast<unsigned long long>(row.iteration), row.seconds,
-                  row.learning_rate, row.loss, row.psnr_db);
+    std::snprintf(line, sizeof(line), "%llu,%.3f,%.6g,%.6f,%.3f\n",
+                  static_cast<unsigned long long>(row.iteration), row.seconds, row.learning_rate,
+                  row.loss, row.psnr_db);
     text += line;
   }
   write_text(run.log(), text);
@@ -166,8 +183,10 @@ std::vector<LogRow> load_log(const RunDirectory& run, uint64_t iteration) {
   while (std::getline(file, line)) {
     LogRow row;
     unsigned long long at = 0;
-    if (std::sscanf(line.c_str(), "%llu,%lf,%lf,%lf,%lf", &at, &row.seconds, &row.learning_rate, &row.loss, &row.psnr_db) != 5) {
-      throw InputError(run.log() + ": row " + std::to_string(rows.size() + 1) + ": not five numbers");
+    if (std::sscanf(line.c_str(), "%llu,%lf,%lf,%lf,%lf", &at, &row.seconds, &row.learning_rate,
+                    &row.loss, &row.psnr_db) != 5) {
+      throw InputError(run.log() + ": row " + std::to_string(rows.size() + 1) +
+                       ": not five numbers");
     }
     row.iteration = at;
     if (row.iteration <= iteration) rows.push_back(row);
@@ -189,19 +208,25 @@ nlohmann::json read_json(const std::string& path) {
   }
 }
 
-void write_json(const std::string& path, const nlohmann::json& json) { write_text(path, json.dump(2) + "\n"); }
+void write_json(const std::string& path, const nlohmann::json& json) {
+  write_text(path, json.dump(2) + "\n");
+}
 
 nlohmann::json describe_machine() {
   std::string cpu = "unknown", line;
   std::ifstream info("/proc/cpuinfo");
   while (std::getline(info, line)) {
     if (line.rfind("model name", 0) != 0) continue;
-    if (const size_t colon = line.find(": "); colon != std::string::npos) cpu = line.substr(colon + 2);
+    if (const size_t colon = line.find(": "); colon != std::string::npos)
+      cpu = line.substr(colon + 2);
     break;
   }
   utsname name{};
   uname(&name);
-  return {{"cpu", cpu}, {"cores", std::thread::hardware_concurrency()}, {"architecture", name.machine}, {"system", name.sysname}};
+  return {{"cpu", cpu},
+          {"cores", std::thread::hardware_concurrency()},
+          {"architecture", name.machine},
+          {"system", name.sysname}};
 }
 
 std::string utc_now() {
@@ -218,15 +243,18 @@ std::string current_command() {
   std::string command, argument;
   while (std::getline(file, argument, '\0')) {
     if (command.empty()) argument = std::filesystem::path(argument).filename().string();
-    command += (command.empty() ? "" : " ") + (argument.find(' ') == std::string::npos ? argument : "'" + argument + "'");
+    command += (command.empty() ? "" : " ") +
+               (argument.find(' ') == std::string::npos ? argument : "'" + argument + "'");
   }
   return command;
 }
 
 std::string current_commit() {
-  if (const char* given = std::getenv("FIGURINE_COMMIT"); given != nullptr && *given != 0) return given;
+  if (const char* given = std::getenv("FIGURINE_COMMIT"); given != nullptr && *given != 0)
+    return given;
   std::error_code error;
-  for (std::filesystem::path folder = std::filesystem::current_path(error); !error; folder = folder.parent_path()) {
+  for (std::filesystem::path folder = std::filesystem::current_path(error); !error;
+       folder = folder.parent_path()) {
     std::string head;
     std::ifstream file(folder / ".git" / "HEAD");
     if (std::getline(file, head)) {

@@ -1,10 +1,11 @@
 // The folder that one training leaves behind (docs/training.md):
 //
-//   run.json                 command, settings, data set, body, machine; when done also iterations, seconds and where they went
-//   log.csv                  iteration, seconds, learning rate, loss, PSNR: means of the iterations since the row before
-//   weights.safetensors      the UNet: layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out]
-//   checkpoint.safetensors   the same and what --resume needs: the optimiser's moments, iteration, seconds
-//   evaluation.json          by figurine-train evaluate reconstruction
+//   run.json                 command, settings, data set, body, machine; when done also iterations,
+//   seconds and where they went log.csv                  iteration, seconds, learning rate, loss,
+//   PSNR: means of the iterations since the row before weights.safetensors      the UNet:
+//   layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out] checkpoint.safetensors   the same and
+//   what --resume needs: the optimiser's moments, iteration, seconds evaluation.json          by
+//   figurine-train evaluate reconstruction
 //
 // Every file appears whole or not at all.
 #pragma once
@@ -41,7 +42,9 @@ struct StageSeconds {
   double splat_backward = 0;
   double unet_backward = 0;
   double optimiser = 0;
-  double total() const { return data + unet_forward + splat_forward + loss + splat_backward + unet_backward + optimiser; }
+  double total() const {
+    return data + unet_forward + splat_forward + loss + splat_backward + unet_backward + optimiser;
+  }
 };
 
 // What changes while training; with the settings it determines everything that follows.
@@ -57,11 +60,14 @@ struct LogRow {
 };
 
 void save_weights(const RunDirectory& run, const model::PoseUNet& unet);
-// A weights or checkpoint file, or a run folder. Throws InputError naming file and layer if a shape differs.
+// A weights or checkpoint file, or a run folder. Throws InputError naming file and layer if a shape
+// differs.
 void load_weights(const std::string& path, model::PoseUNet& unet);
 
-void save_checkpoint(const RunDirectory& run, const TrainingState& state, const model::PoseUNet& unet, const model::Optimiser& optimiser);
-TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet, model::Optimiser& optimiser);
+void save_checkpoint(const RunDirectory& run, const TrainingState& state,
+                     const model::PoseUNet& unet, const model::Optimiser& optimiser);
+TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet,
+                              model::Optimiser& optimiser);
 
 void save_log(const RunDirectory& run, const std::vector<LogRow>& rows);
 // Rows up to and with `iteration`.
@@ -75,6 +81,7 @@ void write_json(const std::string& path, const nlohmann::json& json);
 nlohmann::json describe_machine();
 std::string utc_now();          // 2026-01-31T12:00:00Z
 std::string current_command();  // the command line of this process, its program by file name alone
-std::string current_commit();   // $FIGURINE_COMMIT, or .git's of the working directory; "unknown" otherwise
+std::string
+current_commit();  // $FIGURINE_COMMIT, or .git's of the working directory; "unknown" otherwise
 
 }  // namespace figurine::train

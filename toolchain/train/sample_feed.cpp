@@ -20,7 +20,9 @@ std::vector<std::pair<size_t, size_t>> training_pairs(const dataset::Dataset& da
       if (data.role(frame, camera) == dataset::Role::kTrain) pairs.emplace_back(frame, camera);
     }
   }
-  if (pairs.empty()) throw InputError(data.directory() + ": no training image (all cameras or all frames are held out)");
+  if (pairs.empty())
+    throw InputError(data.directory() +
+                     ": no training image (all cameras or all frames are held out)");
   return pairs;
 }
 
@@ -31,7 +33,8 @@ CroppedImage crop_to_mask(const dataset::CaptureImage& image, uint32_t margin_px
   for (uint32_t y = 0; y < image.height_px; ++y) {
     for (uint32_t x = 0; x < image.width_px; ++x) {
       if (image.alpha[size_t(y) * image.width_px + x] == 0) continue;
-      x0 = std::min(x0, x), x1 = std::max(x1, x + 1), y0 = std::min(y0, y), y1 = std::max(y1, y + 1);
+      x0 = std::min(x0, x), x1 = std::max(x1, x + 1), y0 = std::min(y0, y),
+      y1 = std::max(y1, y + 1);
     }
   }
   CroppedImage crop;
@@ -60,11 +63,14 @@ torch::Tensor target_of(const CroppedImage& image, const model::PixelRect& rect)
   float* planes = target.data_ptr<float>();
   const size_t plane = size_t(rect.width) * rect.height;
   // The overlap of both rectangles, in image coordinates.
-  const uint32_t x0 = std::max(rect.x, image.rect.x), x1 = std::min(rect.x + rect.width, image.rect.x + image.rect.width);
-  const uint32_t y0 = std::max(rect.y, image.rect.y), y1 = std::min(rect.y + rect.height, image.rect.y + image.rect.height);
+  const uint32_t x0 = std::max(rect.x, image.rect.x),
+                 x1 = std::min(rect.x + rect.width, image.rect.x + image.rect.width);
+  const uint32_t y0 = std::max(rect.y, image.rect.y),
+                 y1 = std::min(rect.y + rect.height, image.rect.y + image.rect.height);
   for (uint32_t y = y0; y < y1; ++y) {
     for (uint32_t x = x0; x < x1; ++x) {
-      const uint8_t* from = &image.rgba[(size_t(y - image.rect.y) * image.rect.width + (x - image.rect.x)) * 4];
+      const uint8_t* from =
+          &image.rgba[(size_t(y - image.rect.y) * image.rect.width + (x - image.rect.x)) * 4];
       float* to = planes + size_t(y - rect.y) * rect.width + (x - rect.x);
       for (int c = 0; c < 4; ++c) to[c * plane] = static_cast<float>(from[c]) * (1.0f / 255.0f);
     }
@@ -72,7 +78,8 @@ torch::Tensor target_of(const CroppedImage& image, const model::PixelRect& rect)
   return target;
 }
 
-SampleFeed::SampleFeed(const dataset::Dataset& data, const AvatarModel& model, uint64_t first_sample)
+SampleFeed::SampleFeed(const dataset::Dataset& data, const AvatarModel& model,
+                       uint64_t first_sample)
     : data_(data),
       model_(model),
       pairs_(training_pairs(data)),
@@ -123,7 +130,8 @@ void SampleFeed::work() {
 std::shared_ptr<const CroppedImage> SampleFeed::image(size_t pair) {
   if (const auto found = images_.find(pair); found != images_.end()) return found->second;
   const auto [frame, camera] = pairs_[pair];
-  auto crop = std::make_shared<const CroppedImage>(crop_to_mask(data_.load_image(frame, camera), model_.settings().crop_margin_px));
+  auto crop = std::make_shared<const CroppedImage>(
+      crop_to_mask(data_.load_image(frame, camera), model_.settings().crop_margin_px));
   if (image_bytes_ + crop->rgba.size() <= kMaxImageBytes) {
     image_bytes_ += crop->rgba.size();
     images_.emplace(pair, crop);
@@ -135,11 +143,15 @@ SampleView SampleFeed::prepare_view(uint64_t number, size_t pair) {
   const TrainSettings& settings = model_.settings();
   const size_t camera = pairs_[pair].second;
   const std::shared_ptr<const CroppedImage> truth = image(pair);
-  SampleView view{.camera = camera, .view = {.camera = data_.cameras()[camera].camera, .crop = truth->rect}, .target = {}};
+  SampleView view{.camera = camera,
+                  .view = {.camera = data_.cameras()[camera].camera, .crop = truth->rect},
+                  .target = {}};
   // Gaussians could hide from the loss outside the crop: now and then it looks at the whole image.
-  if (settings.whole_image_period > 0 && number % settings.whole_image_period == settings.whole_image_period - 1) {
+  if (settings.whole_image_period > 0 &&
+      number % settings.whole_image_period == settings.whole_image_period - 1) {
     view.view.crop = {0, 0, view.view.camera.width_px, view.view.camera.height_px};
-    view.loss_scale = float(view.view.crop.width) * float(view.view.crop.height) / (float(truth->rect.width) * float(truth->rect.height));
+    view.loss_scale = float(view.view.crop.width) * float(view.view.crop.height) /
+                      (float(truth->rect.width) * float(truth->rect.height));
   }
   view.target = target_of(*truth, view.view.crop);
   return view;
@@ -149,14 +161,22 @@ Sample SampleFeed::prepare(uint64_t number) {
   const TrainSettings& settings = model_.settings();
   const size_t pair = order_.item(number), frame = pairs_[pair].first;
   Sample sample{.number = number, .frame = frame, .posed = {}, .views = {}};
-  // Further views of the same pose are spread over its cameras, so that they show different sides of the person.
-  const auto of_other_frame = [&](const std::pair<size_t, size_t>& other) { return other.first != frame; };
+  // Further views of the same pose are spread over its cameras, so that they show different sides
+  // of the person.
+  const auto of_other_frame = [&](const std::pair<size_t, size_t>& other) {
+    return other.first != frame;
+  };
   const auto here = pairs_.begin() + static_cast<std::ptrdiff_t>(pair);
-  const size_t first =
-      static_cast<size_t>(std::find_if(std::make_reverse_iterator(here), pairs_.rend(), of_other_frame).base() - pairs_.begin());
-  const size_t count = static_cast<size_t>(std::find_if(here, pairs_.end(), of_other_frame) - pairs_.begin()) - first;
+  const size_t first = static_cast<size_t>(
+      std::find_if(std::make_reverse_iterator(here), pairs_.rend(), of_other_frame).base() -
+      pairs_.begin());
+  const size_t count =
+      static_cast<size_t>(std::find_if(here, pairs_.end(), of_other_frame) - pairs_.begin()) -
+      first;
   const size_t views = std::min<size_t>(settings.views_per_pose, count);
-  for (size_t v = 0; v < views; ++v) sample.views.push_back(prepare_view(number, first + (pair - first + v * count / views) % count));
+  for (size_t v = 0; v < views; ++v)
+    sample.views.push_back(
+        prepare_view(number, first + (pair - first + v * count / views) % count));
   sample.posed = model_.pose(model_.from_capture(data_.frames()[frame]).view());
   switch (settings.background) {
     case TrainingBackground::kBlack:
@@ -165,7 +185,8 @@ Sample SampleFeed::prepare(uint64_t number) {
       sample.background = {0.5f, 0.5f, 0.5f};
       break;
     case TrainingBackground::kRandom:
-      for (uint64_t c = 0; c < 3; ++c) sample.background[c] = random_unit(settings.seed, kBackgroundStream, 3 * number + c);
+      for (uint64_t c = 0; c < 3; ++c)
+        sample.background[c] = random_unit(settings.seed, kBackgroundStream, 3 * number + c);
       break;
   }
   return sample;

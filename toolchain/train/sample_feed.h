@@ -1,8 +1,9 @@
-// What the training loop eats: samples, each one training pose with its UNet input, and one or more images of it, cropped; prepared on a
-// thread of its own, a few samples ahead.
+// What the training loop eats: samples, each one training pose with its UNet input, and one or more
+// images of it, cropped; prepared on a thread of its own, a few samples ahead.
 //
-// Which images a sample has depends on (seed, its number) alone. Images are decoded at their first use and kept as 8-bit crops around
-// the mask (about 0.3 MB at 512x512), up to a limit; past it they are decoded again.
+// Which images a sample has depends on (seed, its number) alone. Images are decoded at their first
+// use and kept as 8-bit crops around the mask (about 0.3 MB at 512x512), up to a limit; past it
+// they are decoded again.
 #pragma once
 
 #include <condition_variable>
@@ -26,7 +27,8 @@ struct SampleView {
   size_t camera = 0;  // of the data set's list
   model::RenderView view;
   torch::Tensor target;  // [4,h,w] premultiplied RGB and mask of view.crop
-  float loss_scale = 1;  // crop area over mask box area: keeps a pixel's weight when the whole image is looked at
+  float loss_scale =
+      1;  // crop area over mask box area: keeps a pixel's weight when the whole image is looked at
 };
 
 struct Sample {
@@ -42,7 +44,8 @@ struct CroppedImage {
   std::vector<uint8_t> rgba;  // [rect.height, rect.width, 4] premultiplied
 };
 
-// The part of an image within margin_px of the pixels with alpha > 0; the whole image if there are none.
+// The part of an image within margin_px of the pixels with alpha > 0; the whole image if there are
+// none.
 CroppedImage crop_to_mask(const dataset::CaptureImage& image, uint32_t margin_px);
 
 // [4,h,w] float of `rect`, zero where the crop has nothing.
@@ -56,7 +59,8 @@ class SampleFeed {
   SampleFeed(const SampleFeed&) = delete;
   SampleFeed& operator=(const SampleFeed&) = delete;
 
-  // Samples first_sample, first_sample + 1, ... Rethrows what went wrong while preparing (InputError on a damaged image).
+  // Samples first_sample, first_sample + 1, ... Rethrows what went wrong while preparing
+  // (InputError on a damaged image).
   Sample next();
 
   size_t image_count() const { return pairs_.size(); }
@@ -69,7 +73,8 @@ class SampleFeed {
 
   const dataset::Dataset& data_;
   const AvatarModel& model_;
-  std::vector<std::pair<size_t, size_t>> pairs_;  // (frame, camera) of all training images, by frame
+  std::vector<std::pair<size_t, size_t>>
+      pairs_;  // (frame, camera) of all training images, by frame
   ShuffledOrder order_;
   std::unordered_map<size_t, std::shared_ptr<const CroppedImage>> images_;
   size_t image_bytes_ = 0;

@@ -19,7 +19,8 @@ Enum parse(const std::string& text, const std::array<Enum, N>& values, const std
   throw InputError(where + ": unknown value \"" + text + "\"");
 }
 
-constexpr std::array kBackgrounds{TrainingBackground::kBlack, TrainingBackground::kGrey, TrainingBackground::kRandom};
+constexpr std::array kBackgrounds{TrainingBackground::kBlack, TrainingBackground::kGrey,
+                                  TrainingBackground::kRandom};
 constexpr std::array kOptimisers{OptimiserKind::kAdamW, OptimiserKind::kMuon};
 constexpr std::array kTemplateModes{TemplateMode::kMean, TemplateMode::kShaped};
 
@@ -47,11 +48,14 @@ TrainSettings preset_settings(const std::string& name) {
   return settings;
 }
 
-uint32_t input_channels(const TrainSettings& settings) { return kMapChannels + 4 * settings.fourier_octaves; }
+uint32_t input_channels(const TrainSettings& settings) {
+  return kMapChannels + 4 * settings.fourier_octaves;
+}
 
 Network make_network(const TrainSettings& settings) {
   const Preset& preset = find_preset(settings.preset);
-  return make_pose_unet(preset.uv_size, input_channels(settings), preset.channels, head_channels(settings.decoding.sh_degree));
+  return make_pose_unet(preset.uv_size, input_channels(settings), preset.channels,
+                        head_channels(settings.decoding.sh_degree));
 }
 
 bool has_fast_bf16() {
@@ -77,7 +81,9 @@ const char* to_string(TrainingBackground background) {
 
 const char* to_string(TemplateMode mode) { return mode == TemplateMode::kMean ? "mean" : "shaped"; }
 
-const char* to_string(OptimiserKind kind) { return kind == OptimiserKind::kMuon ? "muon" : "adamw"; }
+const char* to_string(OptimiserKind kind) {
+  return kind == OptimiserKind::kMuon ? "muon" : "adamw";
+}
 
 nlohmann::json to_json(const TrainSettings& s) {
   return {{"preset", s.preset},
@@ -95,9 +101,14 @@ nlohmann::json to_json(const TrainSettings& s) {
           {"learning_rate", s.schedule.peak},
           {"ramp_iterations", s.schedule.ramp_iterations},
           {"learning_rate_floor", s.schedule.floor_fraction},
-          {"budget", {{"iterations", s.schedule.budget.iterations}, {"seconds", s.schedule.budget.seconds}}},
+          {"budget",
+           {{"iterations", s.schedule.budget.iterations}, {"seconds", s.schedule.budget.seconds}}},
           {"optimiser", to_string(s.optimiser)},
-          {"adamw", {{"beta1", s.beta1}, {"beta2", s.beta2}, {"epsilon", s.epsilon}, {"weight_decay", s.weight_decay}}},
+          {"adamw",
+           {{"beta1", s.beta1},
+            {"beta2", s.beta2},
+            {"epsilon", s.epsilon},
+            {"weight_decay", s.weight_decay}}},
           {"precision", s.bf16 ? "bf16" : "f32"},
           {"threads", s.threads},
           {"views_per_pose", s.views_per_pose},
@@ -114,7 +125,8 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
   TrainSettings s;
   try {
     s.preset = json.at("preset").get<std::string>();
-    s.template_mode = parse(json.at("template").get<std::string>(), kTemplateModes, where + ": template");
+    s.template_mode =
+        parse(json.at("template").get<std::string>(), kTemplateModes, where + ": template");
     s.freeze_pose = json.at("freeze_pose").get<bool>();
     s.fourier_octaves = json.at("fourier_octaves").get<uint32_t>();
     const nlohmann::json& decoding = json.at("decoding");
@@ -130,7 +142,8 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
                   .floor_fraction = json.at("learning_rate_floor").get<double>(),
                   .budget = {.iterations = json.at("budget").at("iterations").get<uint64_t>(),
                              .seconds = json.at("budget").at("seconds").get<double>()}};
-    s.optimiser = parse(json.value("optimiser", std::string("adamw")), kOptimisers, where + ": optimiser");
+    s.optimiser =
+        parse(json.value("optimiser", std::string("adamw")), kOptimisers, where + ": optimiser");
     const nlohmann::json& adamw = json.at("adamw");
     s.beta1 = adamw.at("beta1").get<double>();
     s.beta2 = adamw.at("beta2").get<double>();
@@ -145,7 +158,8 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     s.ssim_weight = json.at("loss").at("ssim").get<float>();
     s.mask_weight = json.at("loss").at("mask").get<float>();
     s.standoff_weight = json.value("standoff_weight", 0.0f);
-    s.background = parse(json.at("background").get<std::string>(), kBackgrounds, where + ": background");
+    s.background =
+        parse(json.at("background").get<std::string>(), kBackgrounds, where + ": background");
     s.warmup_iterations = json.at("warmup_iterations").get<uint32_t>();
     s.crop_margin_px = json.at("crop_margin_px").get<uint32_t>();
     s.whole_image_period = json.at("whole_image_period").get<uint32_t>();
@@ -155,14 +169,21 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
   find_preset(s.preset);
   require(s.fourier_octaves <= 10, where, "fourier_octaves: more than 10");
   require(s.decoding.sh_degree <= kMaxShDegree, where, "decoding.sh_degree: more than 3");
-  for (float value : {s.decoding.offset_scale_m, s.decoding.spacing_scale, s.decoding.max_log_scale}) {
-    require(std::isfinite(value) && value > 0, where, "decoding: scales must be positive and finite");
+  for (float value :
+       {s.decoding.offset_scale_m, s.decoding.spacing_scale, s.decoding.max_log_scale}) {
+    require(std::isfinite(value) && value > 0, where,
+            "decoding: scales must be positive and finite");
   }
-  require(s.schedule.peak > 0 && std::isfinite(s.schedule.peak), where, "learning_rate: must be positive and finite");
-  require(s.standoff_weight >= 0 && std::isfinite(s.standoff_weight), where, "standoff_weight: must be finite and not negative");
-  require((s.schedule.budget.iterations > 0) != (s.schedule.budget.seconds > 0), where, "budget: iterations or seconds, one of both");
-  require(s.views_per_pose >= 1 && s.views_per_pose <= 64, where, "views_per_pose: must be 1 to 64");
-  require(s.poses_per_iteration >= 1 && s.poses_per_iteration <= 64, where, "poses_per_iteration: must be 1 to 64");
+  require(s.schedule.peak > 0 && std::isfinite(s.schedule.peak), where,
+          "learning_rate: must be positive and finite");
+  require(s.standoff_weight >= 0 && std::isfinite(s.standoff_weight), where,
+          "standoff_weight: must be finite and not negative");
+  require((s.schedule.budget.iterations > 0) != (s.schedule.budget.seconds > 0), where,
+          "budget: iterations or seconds, one of both");
+  require(s.views_per_pose >= 1 && s.views_per_pose <= 64, where,
+          "views_per_pose: must be 1 to 64");
+  require(s.poses_per_iteration >= 1 && s.poses_per_iteration <= 64, where,
+          "poses_per_iteration: must be 1 to 64");
   require(s.threads >= 1 && s.threads <= 256, where, "threads: must be 1 to 256");
   return s;
 }

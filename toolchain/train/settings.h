@@ -1,4 +1,5 @@
-// What one avatar's training is told to do: everything that, with the data, decides the weights. Kept in RUN/run.json.
+// What one avatar's training is told to do: everything that, with the data, decides the weights.
+// Kept in RUN/run.json.
 #pragma once
 
 #include <array>
@@ -20,41 +21,54 @@ struct Preset {
   uint32_t fourier_octaves;  // constant input channels: 4 per octave; 0: as in the paper
 };
 
-inline constexpr std::array<Preset, 3> kPresets{{{"nano", 32, 8, 0, 5}, {"edge", 128, 32, 0, 5}, {"paper", 256, 64, 3, 0}}};
+inline constexpr std::array<Preset, 3> kPresets{
+    {{"nano", 32, 8, 0, 5}, {"edge", 128, 32, 0, 5}, {"paper", 256, 64, 3, 0}}};
 
 // Throws InputError naming the known ones.
 const Preset& find_preset(const std::string& name);
 
-// What lies behind prediction and truth in the loss. Behind dark clothes black hides every fault of the outline, which grey shows.
+// What lies behind prediction and truth in the loss. Behind dark clothes black hides every fault of
+// the outline, which grey shows.
 enum class TrainingBackground : uint8_t { kBlack, kGrey, kRandom };
 
-// What updates the kernels of the hidden convolutions; biases and the head are AdamW's either way (toolchain/model/optimiser.h).
+// What updates the kernels of the hidden convolutions; biases and the head are AdamW's either way
+// (toolchain/model/optimiser.h).
 enum class OptimiserKind : uint8_t { kAdamW, kMuon };
 
 struct TrainSettings {
   std::string preset = "edge";
   TemplateMode template_mode = TemplateMode::kShaped;
-  bool freeze_pose = false;  // the network sees the rest pose in the true root orientation; the Gaussians are skinned with the true pose
+  bool freeze_pose = false;  // the network sees the rest pose in the true root orientation; the
+                             // Gaussians are skinned with the true pose
   uint32_t fourier_octaves = 5;
   HeadDecoding decoding{.spacing_scale = 0.45f};
 
-  uint64_t seed = 1;  // of the order of the images; initial weights are the same for all avatars (kInitialWeightsSeed, or --init)
+  uint64_t seed = 1;  // of the order of the images; initial weights are the same for all avatars
+                      // (kInitialWeightsSeed, or --init)
   std::string init;   // weights or run to start from; empty: the common initial weights
-  Schedule schedule{.peak = 2e-3, .ramp_iterations = 50, .floor_fraction = 0.02, .budget = {.iterations = 0, .seconds = 600}};
+  Schedule schedule{.peak = 2e-3,
+                    .ramp_iterations = 50,
+                    .floor_fraction = 0.02,
+                    .budget = {.iterations = 0, .seconds = 600}};
   OptimiserKind optimiser = OptimiserKind::kMuon;
   // AdamW's. An epsilon of 1e-8 would swallow the small gradients of a mean loss.
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-10, weight_decay = 0;
-  bool bf16 = false;  // arithmetic of the convolutions while training; weights, head and evaluation are float
+  bool bf16 = false;  // arithmetic of the convolutions while training; weights, head and evaluation
+                      // are float
   uint32_t threads = 1;
-  uint32_t views_per_pose = 1;       // images of one pose an iteration, sharing one run of the network; the paper's batch is 1
-  uint32_t poses_per_iteration = 1;  // each on its own share of the threads; their gradients are averaged
+  uint32_t views_per_pose =
+      1;  // images of one pose an iteration, sharing one run of the network; the paper's batch is 1
+  uint32_t poses_per_iteration =
+      1;  // each on its own share of the threads; their gradients are averaged
   float ssim_weight = 0.1f;
   float mask_weight = 0.1f;
-  float standoff_weight = 4;  // of the pull on Gaussians from mask that the picture leaves uncovered (standoff.h); 0: none
+  float standoff_weight = 4;  // of the pull on Gaussians from mask that the picture leaves
+                              // uncovered (standoff.h); 0: none
   TrainingBackground background = TrainingBackground::kGrey;
-  uint32_t warmup_iterations = 0;    // of fitting reference Gaussians before the first image
-  uint32_t crop_margin_px = 16;      // around the box of the true mask
-  uint32_t whole_image_period = 16;  // every so many iterations the loss sees the whole image; 0: never
+  uint32_t warmup_iterations = 0;  // of fitting reference Gaussians before the first image
+  uint32_t crop_margin_px = 16;    // around the box of the true mask
+  uint32_t whole_image_period =
+      16;  // every so many iterations the loss sees the whole image; 0: never
 };
 
 // All avatars of a population start from the same weights (paper, section 4.1).

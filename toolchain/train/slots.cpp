@@ -38,7 +38,8 @@ void write_all(int file, const std::string& text) {
   }
 }
 
-[[noreturn]] void run_child(size_t index, const std::function<std::string(size_t)>& job, int pipe, pid_t parent) {
+[[noreturn]] void run_child(size_t index, const std::function<std::string(size_t)>& job, int pipe,
+                            pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGINT);
   if (getppid() != parent) _exit(kInterrupted);  // it died before it could tell
   int code = kFailed;
@@ -57,7 +58,8 @@ void write_all(int file, const std::string& text) {
 
 RunningJob start(size_t index, const std::function<std::string(size_t)>& job, pid_t& pid) {
   int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) throw InputError(std::string("cannot start a job: ") + std::strerror(errno));
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw InputError(std::string("cannot start a job: ") + std::strerror(errno));
   std::fflush(nullptr);  // what is buffered would be printed by both
   const pid_t parent = getpid();
   pid = fork();
@@ -78,7 +80,8 @@ RunningJob start(size_t index, const std::function<std::string(size_t)>& job, pi
 // Reads what is there, so that a long text cannot block the job.
 void drain(RunningJob& job) {
   char buffer[4096];
-  for (ssize_t n; (n = read(job.pipe, buffer, sizeof(buffer))) > 0;) job.text.append(buffer, static_cast<size_t>(n));
+  for (ssize_t n; (n = read(job.pipe, buffer, sizeof(buffer))) > 0;)
+    job.text.append(buffer, static_cast<size_t>(n));
 }
 
 JobResult result_of(RunningJob& job, int status) {
@@ -86,7 +89,8 @@ JobResult result_of(RunningJob& job, int status) {
   close(job.pipe);
   JobResult result{.done = false, .interrupted = false, .text = std::move(job.text)};
   if (WIFSIGNALED(status)) {
-    result.text = std::string("ended by signal ") + std::to_string(WTERMSIG(status)) + " (" + strsignal(WTERMSIG(status)) + ")";
+    result.text = std::string("ended by signal ") + std::to_string(WTERMSIG(status)) + " (" +
+                  strsignal(WTERMSIG(status)) + ")";
   } else {
     result.done = WEXITSTATUS(status) == kDone;
     result.interrupted = WEXITSTATUS(status) == kInterrupted;
@@ -96,8 +100,10 @@ JobResult result_of(RunningJob& job, int status) {
 
 }  // namespace
 
-void run_in_slots(size_t count, const SlotOptions& options, const std::function<std::string(size_t)>& job,
-                  const std::function<void(size_t, const JobResult&)>& ended, const std::function<void()>& waiting) {
+void run_in_slots(size_t count, const SlotOptions& options,
+                  const std::function<std::string(size_t)>& job,
+                  const std::function<void(size_t, const JobResult&)>& ended,
+                  const std::function<void()>& waiting) {
   std::map<pid_t, RunningJob> running;
   size_t next = 0;
   bool passed_on = false;
@@ -127,7 +133,8 @@ void run_in_slots(size_t count, const SlotOptions& options, const std::function<
       ended(index, result);
     }
     waiting();
-    if (!running.empty()) std::this_thread::sleep_for(std::chrono::duration<double>(options.poll_period_s));
+    if (!running.empty())
+      std::this_thread::sleep_for(std::chrono::duration<double>(options.poll_period_s));
   }
   if (passed_on) throw Interrupted("stopped; --resume goes on from here");
 }

@@ -10,26 +10,33 @@
 
 namespace figurine::train {
 
-static_assert(std::endian::native == std::endian::little, "arrays are copied as they lie in memory");
+static_assert(std::endian::native == std::endian::little,
+              "arrays are copied as they lie in memory");
 
 namespace {
 
 constexpr size_t kMaxHeaderBytes = 16 << 20;
 
-[[noreturn]] void fail(const std::string& path, const std::string& reason) { throw InputError(path + ": " + reason); }
+[[noreturn]] void fail(const std::string& path, const std::string& reason) {
+  throw InputError(path + ": " + reason);
+}
 
-NamedTensor read_tensor(const std::string& path, const std::string& name, const nlohmann::json& entry, std::span<const std::byte> data) {
+NamedTensor read_tensor(const std::string& path, const std::string& name,
+                        const nlohmann::json& entry, std::span<const std::byte> data) {
   const std::string field = "tensor " + name;
   if (entry.at("dtype").get<std::string>() != "F32") fail(path, field + ": dtype is not F32");
   NamedTensor tensor{.shape = entry.at("shape").get<std::vector<int64_t>>(), .values = {}};
   const auto offsets = entry.at("data_offsets").get<std::vector<uint64_t>>();
-  if (offsets.size() != 2 || offsets[0] > offsets[1] || offsets[1] > data.size()) fail(path, field + ": data_offsets are outside the file");
+  if (offsets.size() != 2 || offsets[0] > offsets[1] || offsets[1] > data.size())
+    fail(path, field + ": data_offsets are outside the file");
   uint64_t count = 1;
   for (int64_t side : tensor.shape) {
-    if (side < 0 || (side > 0 && count > data.size() / static_cast<uint64_t>(side))) fail(path, field + ": shape is larger than the file");
+    if (side < 0 || (side > 0 && count > data.size() / static_cast<uint64_t>(side)))
+      fail(path, field + ": shape is larger than the file");
     count *= static_cast<uint64_t>(side);
   }
-  if (count * sizeof(float) != offsets[1] - offsets[0]) fail(path, field + ": shape and data_offsets contradict each other");
+  if (count * sizeof(float) != offsets[1] - offsets[0])
+    fail(path, field + ": shape and data_offsets contradict each other");
   tensor.values.resize(count);
   if (count > 0) std::memcpy(tensor.values.data(), data.data() + offsets[0], count * sizeof(float));
   for (float value : tensor.values) {
@@ -46,7 +53,8 @@ TensorFile read_tensor_file(const std::string& path) {
   uint64_t header_bytes = 0;
   if (bytes.size() < sizeof(header_bytes)) fail(path, "too short for a tensor file");
   std::memcpy(&header_bytes, bytes.data(), sizeof(header_bytes));
-  if (header_bytes > kMaxHeaderBytes || header_bytes > bytes.size() - sizeof(header_bytes)) fail(path, "header length is outside the file");
+  if (header_bytes > kMaxHeaderBytes || header_bytes > bytes.size() - sizeof(header_bytes))
+    fail(path, "header length is outside the file");
   const char* text = reinterpret_cast<const char*>(bytes.data()) + sizeof(header_bytes);
   TensorFile file;
   try {
@@ -55,7 +63,8 @@ TensorFile read_tensor_file(const std::string& path) {
       if (name == "__metadata__") {
         file.metadata = entry.get<std::map<std::string, std::string>>();
       } else {
-        file.tensors[name] = read_tensor(path, name, entry, bytes.subspan(sizeof(header_bytes) + header_bytes));
+        file.tensors[name] =
+            read_tensor(path, name, entry, bytes.subspan(sizeof(header_bytes) + header_bytes));
       }
     }
   } catch (const nlohmann::json::exception&) {

@@ -1,8 +1,9 @@
-// Named float arrays and string metadata in one file, in the safetensors layout: readable by its own library in any language, and by forty
-// lines here.
+// Named float arrays and string metadata in one file, in the safetensors layout: readable by its
+// own library in any language, and by forty lines here.
 //
-//   8 bytes little-endian: length of the header;   header: JSON {"__metadata__": {key: string}, name: {"dtype": "F32", "shape": [...],
-//   "data_offsets": [begin, end]}};   data.   Only F32 is read and written. Files appear whole or not at all.
+//   8 bytes little-endian: length of the header;   header: JSON {"__metadata__": {key: string},
+//   name: {"dtype": "F32", "shape": [...], "data_offsets": [begin, end]}};   data.   Only F32 is
+//   read and written. Files appear whole or not at all.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,8 @@ struct TensorFile {
   std::map<std::string, NamedTensor> tensors;
 };
 
-// Throws InputError naming the path: missing, cut off, not this layout, sizes that contradict each other, values that are not finite.
+// Throws InputError naming the path: missing, cut off, not this layout, sizes that contradict each
+// other, values that are not finite.
 TensorFile read_tensor_file(const std::string& path);
 
 // Throws InputError if the disk refuses.

@@ -5,8 +5,9 @@
 
 namespace figurine::train {
 
-// For LibTorch's own loops and for OpenBLAS, which multiplies its float matrices on threads of its own and would take all cores: idle ones
-// wait by spinning, and a training beside another one falls to a tenth of its speed (docs/generation.md).
+// For LibTorch's own loops and for OpenBLAS, which multiplies its float matrices on threads of its
+// own and would take all cores: idle ones wait by spinning, and a training beside another one falls
+// to a tenth of its speed (docs/generation.md).
 void use_threads(uint32_t count);
 
 }  // namespace figurine::train

@@ -23,16 +23,20 @@ TrainedAvatar TrainedAvatar::open(const OpenRunOptions& options) {
   avatar.body_ = std::make_unique<PackageFile>(open_package(description.body, PackageKind::kBody));
   const std::string hash = format_hash(avatar.body_->package.content_hash());
   if (hash != description.body_hash) {
-    throw InputError(description.body + ": is body " + hash + ", " + options.run + " was trained on " + description.body_hash);
+    throw InputError(description.body + ": is body " + hash + ", " + options.run +
+                     " was trained on " + description.body_hash);
   }
-  avatar.data_ = std::make_unique<dataset::Dataset>(
-      dataset::Dataset::open(description.data, {.body = &avatar.body_->package.body(), .body_hash = hash}));
-  if (avatar.data_->shape() != description.shape) throw InputError(description.data + ": shape: is not the person of " + options.run);
+  avatar.data_ = std::make_unique<dataset::Dataset>(dataset::Dataset::open(
+      description.data, {.body = &avatar.body_->package.body(), .body_hash = hash}));
+  if (avatar.data_->shape() != description.shape)
+    throw InputError(description.data + ": shape: is not the person of " + options.run);
   TrainSettings settings = description.settings;
   settings.threads = options.threads;
   at::set_num_threads(static_cast<int>(options.threads));
-  avatar.model_ = std::make_unique<AvatarModel>(avatar.body_->package.body(), description.shape, settings, false);
-  if (!std::filesystem::exists(run.weights())) throw InputError(options.run + ": has no weights yet");
+  avatar.model_ = std::make_unique<AvatarModel>(avatar.body_->package.body(), description.shape,
+                                                settings, false);
+  if (!std::filesystem::exists(run.weights()))
+    throw InputError(options.run + ": has no weights yet");
   load_weights(run.weights(), avatar.model_->unet());
   return avatar;
 }

@@ -1,4 +1,5 @@
-// A finished (or interrupted) run, opened for looking at: data set, body and the model in float, as a device computes it.
+// A finished (or interrupted) run, opened for looking at: data set, body and the model in float, as
+// a device computes it.
 #pragma once
 
 #include <memory>

@@ -25,10 +25,13 @@ namespace figurine::train {
 namespace {
 
 constexpr int kRunFormat = 1;
-constexpr uint64_t kLogPeriod = 50;    // iterations per row
-constexpr double kRunningMean = 0.02;  // weight of the newest iteration in what the progress bar shows
+constexpr uint64_t kLogPeriod = 50;  // iterations per row
+constexpr double kRunningMean =
+    0.02;  // weight of the newest iteration in what the progress bar shows
 
-double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 // Adds the time since the last call to a stage.
 class StageClock {
@@ -48,7 +51,9 @@ struct Means {
   double loss = 0, squared_error = 0;
   uint64_t foreground = 0, count = 0;
   double psnr_db() const {
-    return foreground == 0 || squared_error <= 0 ? 0 : -10 * std::log10(squared_error / (3.0 * static_cast<double>(foreground)));
+    return foreground == 0 || squared_error <= 0
+               ? 0
+               : -10 * std::log10(squared_error / (3.0 * static_cast<double>(foreground)));
   }
 };
 
@@ -65,29 +70,39 @@ struct PoseResult {
 };
 
 // Never more lanes than threads: poses beyond them wait for their turn.
-unsigned lane_count(const TrainSettings& settings) { return std::min(settings.poses_per_iteration, settings.threads); }
+unsigned lane_count(const TrainSettings& settings) {
+  return std::min(settings.poses_per_iteration, settings.threads);
+}
 
 // LibTorch's number of threads inside an operation belongs to the thread that calls it.
-void use_lane_threads(const TrainSettings& settings) { at::set_num_threads(static_cast<int>(settings.threads / lane_count(settings))); }
+void use_lane_threads(const TrainSettings& settings) {
+  at::set_num_threads(static_cast<int>(settings.threads / lane_count(settings)));
+}
 
 class Trainer {
  public:
-  Trainer(const TrainRequest& request, const TrainSettings& settings, const PackageFile& body, const dataset::Dataset& data,
-          nlohmann::json description)
+  Trainer(const TrainRequest& request, const TrainSettings& settings, const PackageFile& body,
+          const dataset::Dataset& data, nlohmann::json description)
       : request_(request),
         settings_(settings),
         run_{request.run},
         data_(data),
         description_(std::move(description)),
         model_(body.package.body(), data.shape(), lane_settings(), settings.bf16),
-        optimiser_(
-            settings.optimiser == OptimiserKind::kMuon ? model_.unet().muon_groups() : model::adamw_group(model_.unet().parameter_count()),
-            {.beta1 = settings.beta1, .beta2 = settings.beta2, .epsilon = settings.epsilon, .weight_decay = settings.weight_decay}) {
+        optimiser_(settings.optimiser == OptimiserKind::kMuon
+                       ? model_.unet().muon_groups()
+                       : model::adamw_group(model_.unet().parameter_count()),
+                   {.beta1 = settings.beta1,
+                    .beta2 = settings.beta2,
+                    .epsilon = settings.epsilon,
+                    .weight_decay = settings.weight_decay}) {
     for (unsigned lane = 1; lane < lane_count(settings_); ++lane) {
-      replicas_.push_back(std::make_unique<AvatarModel>(body.package.body(), data.shape(), lane_settings(), settings.bf16));
+      replicas_.push_back(std::make_unique<AvatarModel>(body.package.body(), data.shape(),
+                                                        lane_settings(), settings.bf16));
       replicas_.back()->unet().share_weights(model_.unet());
     }
-    for (unsigned lane = 0; lane < lane_count(settings_); ++lane) model_of(lane).unet().set_fake_quantisation(request.fake_quantisation);
+    for (unsigned lane = 0; lane < lane_count(settings_); ++lane)
+      model_of(lane).unet().set_fake_quantisation(request.fake_quantisation);
   }
 
   TrainResult run() {
@@ -100,9 +115,11 @@ class Trainer {
     const uint64_t session_first = state_.iteration;
     double done = train::progress(settings_.schedule.budget, state_.iteration, state_.seconds);
     while (done < 1) {
-      if (interrupt.requested() || (request_.stop_after > 0 && state_.iteration >= request_.stop_after)) {
+      if (interrupt.requested() ||
+          (request_.stop_after > 0 && state_.iteration >= request_.stop_after)) {
         save("interrupted");
-        throw Interrupted(run_.path + ": stopped after " + std::to_string(state_.iteration) + " iterations; --resume goes on from here");
+        throw Interrupted(run_.path + ": stopped after " + std::to_string(state_.iteration) +
+                          " iterations; --resume goes on from here");
       }
       const double rate = learning_rate(settings_.schedule, state_.iteration, state_.seconds);
       const double before = now_s();
@@ -111,10 +128,13 @@ class Trainer {
       ++state_.iteration;
       record(result, rate);
       done = train::progress(settings_.schedule.budget, state_.iteration, state_.seconds);
-      const double speed = static_cast<double>(state_.iteration - session_first) / std::max(1e-9, state_.seconds - session_start);
-      const double seconds_left = settings_.schedule.budget.iterations > 0
-                                      ? static_cast<double>(settings_.schedule.budget.iterations - state_.iteration) / std::max(1e-9, speed)
-                                      : settings_.schedule.budget.seconds - state_.seconds;
+      const double speed = static_cast<double>(state_.iteration - session_first) /
+                           std::max(1e-9, state_.seconds - session_start);
+      const double seconds_left =
+          settings_.schedule.budget.iterations > 0
+              ? static_cast<double>(settings_.schedule.budget.iterations - state_.iteration) /
+                    std::max(1e-9, speed)
+              : settings_.schedule.budget.seconds - state_.seconds;
       progress.show(done, TrainingLine{.iteration = state_.iteration,
                                        .loss = shown_loss_,
                                        .psnr_db = shown_psnr(),
@@ -157,9 +177,11 @@ class Trainer {
     for (uint32_t i = 0; i < count; ++i) samples.push_back(feed.next());
     clock.add(state_.stages.data);
     std::vector<PoseResult> poses(count);
-    const double fade = standoff_fade(train::progress(settings_.schedule.budget, state_.iteration, state_.seconds));
+    const double fade =
+        standoff_fade(train::progress(settings_.schedule.budget, state_.iteration, state_.seconds));
     lanes_.run([&](unsigned lane) {
-      for (uint32_t i = lane; i < count; i += lanes) poses[i] = pose_iteration(samples[i], model_of(lane), fade);
+      for (uint32_t i = lane; i < count; i += lanes)
+        poses[i] = pose_iteration(samples[i], model_of(lane), fade);
     });
     for (size_t i = 0; i < count; i += lanes) add_stages(poses[i].stages);
     StageClock last;
@@ -174,7 +196,8 @@ class Trainer {
       result.foreground += poses[i].result.foreground;
     }
     if (count > 1) gradients.mul_(1.0 / count);
-    if (!optimiser_.step(model_.unet().weights(), gradients, rate)) fail(samples[0], "a gradient is not finite");
+    if (!optimiser_.step(model_.unet().weights(), gradients, rate))
+      fail(samples[0], "a gradient is not finite");
     last.add(state_.stages.optimiser);
     return result;
   }
@@ -206,24 +229,31 @@ class Trainer {
     return pose;
   }
 
-  // The graph is cut at the head and at the pictures, so that each part's backward pass can be timed and the views of a pose can share one
-  // run of the network. Gradients are those of the mean loss of the views.
-  IterationResult image_iteration(const Sample& sample, const torch::Tensor& head, AvatarModel& model, double fade, StageClock& clock,
+  // The graph is cut at the head and at the pictures, so that each part's backward pass can be
+  // timed and the views of a pose can share one run of the network. Gradients are those of the mean
+  // loss of the views.
+  IterationResult image_iteration(const Sample& sample, const torch::Tensor& head,
+                                  AvatarModel& model, double fade, StageClock& clock,
                                   StageSeconds& stages) const {
     const torch::Tensor head_leaf = head.detach().requires_grad_();
-    std::vector<double> pulls(fade * settings_.standoff_weight > 0 ? model.body().texel_position_m.size() : 0);
+    std::vector<double> pulls(
+        fade * settings_.standoff_weight > 0 ? model.body().texel_position_m.size() : 0);
     const double share = 1.0 / static_cast<double>(sample.views.size());
     IterationResult result;
     for (const SampleView& view : sample.views) {
-      const torch::Tensor image = model.renderer().render(head_leaf, model.head_frame(sample.posed), view.view);
+      const torch::Tensor image =
+          model.renderer().render(head_leaf, model.head_frame(sample.posed), view.view);
       clock.add(stages.splat_forward);
       const torch::Tensor image_leaf = image.detach().requires_grad_();
       model::LossTerms terms;
-      const torch::Tensor loss = model::image_loss(
-          image_leaf, view.target, sample.background,
-          {.ssim_weight = settings_.ssim_weight, .mask_weight = settings_.mask_weight, .threads = model.settings().threads}, &terms);
+      const torch::Tensor loss = model::image_loss(image_leaf, view.target, sample.background,
+                                                   {.ssim_weight = settings_.ssim_weight,
+                                                    .mask_weight = settings_.mask_weight,
+                                                    .threads = model.settings().threads},
+                                                   &terms);
       (loss * (view.loss_scale * share)).backward();
-      if (!pulls.empty()) result.loss += add_pulls(model, view, image_leaf, fade * view.loss_scale * share, pulls);
+      if (!pulls.empty())
+        result.loss += add_pulls(model, view, image_leaf, fade * view.loss_scale * share, pulls);
       clock.add(stages.loss);
       image.backward(image_leaf.grad());
       clock.add(stages.splat_backward);
@@ -231,25 +261,32 @@ class Trainer {
       result.squared_error += terms.squared_error;
       result.foreground += terms.foreground;
     }
-    if (!pulls.empty()) add_offset_gradient(model.head_frame(sample.posed), pulls, head_leaf.grad().mutable_data_ptr<float>());
+    if (!pulls.empty())
+      add_offset_gradient(model.head_frame(sample.posed), pulls,
+                          head_leaf.grad().mutable_data_ptr<float>());
     head.backward(head_leaf.grad());
     clock.add(stages.unet_backward);
     return result;
   }
 
   // Of the picture that was rendered last; its share of the loss.
-  double add_pulls(AvatarModel& model, const SampleView& view, const torch::Tensor& image, double scale, std::vector<double>& pulls) const {
+  double add_pulls(AvatarModel& model, const SampleView& view, const torch::Tensor& image,
+                   double scale, std::vector<double>& pulls) const {
     const StandoffView seen{.camera = &view.view.camera,
                             .crop = view.view.crop,
                             .alpha = image[3].const_data_ptr<float>(),
                             .mask = view.target[3].const_data_ptr<float>()};
-    const StandoffOptions options{.weight = settings_.standoff_weight, .unit_m = settings_.decoding.offset_scale_m};
-    return scale * standoff_loss(seen, model.renderer().gaussians().position_m, options, scale, pulls);
+    const StandoffOptions options{.weight = settings_.standoff_weight,
+                                  .unit_m = settings_.decoding.offset_scale_m};
+    return scale *
+           standoff_loss(seen, model.renderer().gaussians().position_m, options, scale, pulls);
   }
 
   [[noreturn]] void fail(const Sample& sample, const char* what) const {
-    throw InputError(run_.path + ": iteration " + std::to_string(sample.number / settings_.poses_per_iteration) + " (" +
-                     data_.image_path(sample.frame, sample.views.front().camera) + "): " + what + "; the last checkpoint is kept");
+    throw InputError(run_.path + ": iteration " +
+                     std::to_string(sample.number / settings_.poses_per_iteration) + " (" +
+                     data_.image_path(sample.frame, sample.views.front().camera) + "): " + what +
+                     "; the last checkpoint is kept");
   }
 
   void record(const IterationResult& result, double rate) {
@@ -264,7 +301,8 @@ class Trainer {
       shown_mse_ = shown_mse_ < 0 ? mse : shown_mse_ + weight * (mse - shown_mse_);
     }
     if (state_.iteration % kLogPeriod == 0) {
-      rows_.push_back({state_.iteration, state_.seconds, rate, means_.loss / static_cast<double>(means_.count), means_.psnr_db()});
+      rows_.push_back({state_.iteration, state_.seconds, rate,
+                       means_.loss / static_cast<double>(means_.count), means_.psnr_db()});
       means_ = {};
     }
   }
@@ -280,7 +318,8 @@ class Trainer {
     description_["status"] = status;
     description_["iterations"] = state_.iteration;
     description_["train_seconds"] = state_.seconds;
-    description_["iterations_per_second"] = state_.seconds > 0 ? static_cast<double>(state_.iteration) / state_.seconds : 0.0;
+    description_["iterations_per_second"] =
+        state_.seconds > 0 ? static_cast<double>(state_.iteration) / state_.seconds : 0.0;
     description_["breakdown_ms"] = {{"data", 1e3 * s.data / iterations},
                                     {"unet_forward", 1e3 * s.unet_forward / iterations},
                                     {"splat_forward", 1e3 * s.splat_forward / iterations},
@@ -310,13 +349,15 @@ class Trainer {
   uint64_t shown_count_ = 0;
 };
 
-nlohmann::json describe(const TrainRequest& request, const TrainSettings& settings, const PackageFile& body, const dataset::Dataset& data) {
+nlohmann::json describe(const TrainRequest& request, const TrainSettings& settings,
+                        const PackageFile& body, const dataset::Dataset& data) {
   uint32_t held_out_cameras = 0;
   for (const dataset::CaptureCamera& camera : data.cameras()) held_out_cameras += camera.held_out;
   uint32_t frames[3] = {0, 0, 0};
   for (const dataset::CaptureFrame& frame : data.frames()) ++frames[static_cast<int>(frame.split)];
   Network network = make_network(settings);
-  const std::vector<ValueShape> shapes = value_or_throw(infer_shapes(network, false), settings.preset);
+  const std::vector<ValueShape> shapes =
+      value_or_throw(infer_shapes(network, false), settings.preset);
   return {{"format", kRunFormat},
           {"status", "running"},
           {"tool", "figurine-train " FIGURINE_VERSION},
@@ -326,7 +367,10 @@ nlohmann::json describe(const TrainRequest& request, const TrainSettings& settin
           {"machine", describe_machine()},
           {"settings", to_json(settings)},
           {"macs_per_frame", count_macs(network, shapes)},
-          {"body", {{"path", request.body}, {"name", body.package.body().name}, {"hash", format_hash(body.package.content_hash())}}},
+          {"body",
+           {{"path", request.body},
+            {"name", body.package.body().name},
+            {"hash", format_hash(body.package.content_hash())}}},
           {"shape", data.shape()},
           {"data",
            {{"path", request.data},
@@ -343,13 +387,15 @@ nlohmann::json describe(const TrainRequest& request, const TrainSettings& settin
 
 RunDescription read_run(const RunDirectory& run) {
   const std::string path = run.run_json();
-  if (!std::filesystem::exists(path)) throw InputError(run.path + ": no run.json; is this a folder of figurine-train avatar?");
+  if (!std::filesystem::exists(path))
+    throw InputError(run.path + ": no run.json; is this a folder of figurine-train avatar?");
   RunDescription description;
   description.json = read_json(path);
   try {
     const nlohmann::json& json = description.json;
     if (const int format = json.at("format").get<int>(); format != kRunFormat) {
-      throw InputError(path + ": format: is " + std::to_string(format) + ", this build reads " + std::to_string(kRunFormat));
+      throw InputError(path + ": format: is " + std::to_string(format) + ", this build reads " +
+                       std::to_string(kRunFormat));
     }
     description.data = json.at("data").at("path").get<std::string>();
     description.body = json.at("body").at("path").get<std::string>();
@@ -367,14 +413,17 @@ TrainResult train_avatar(const TrainRequest& request) {
   TrainSettings settings = request.settings;
   nlohmann::json description;
   const bool exists = std::filesystem::exists(run.run_json());
-  if (exists && !request.resume) throw InputError(request.run + ": holds a run already; --resume goes on with it");
-  if (!exists && request.resume) throw InputError(request.run + ": no run to resume (run.json is missing)");
+  if (exists && !request.resume)
+    throw InputError(request.run + ": holds a run already; --resume goes on with it");
+  if (!exists && request.resume)
+    throw InputError(request.run + ": no run to resume (run.json is missing)");
   const PackageFile body = open_package(request.body, PackageKind::kBody);
   const std::string body_hash = format_hash(body.package.content_hash());
   if (exists) {
     RunDescription old = read_run(run);
     if (old.body_hash != body_hash) {
-      throw InputError(request.run + ": was trained on body " + old.body_hash + ", " + request.body + " is " + body_hash);
+      throw InputError(request.run + ": was trained on body " + old.body_hash + ", " +
+                       request.body + " is " + body_hash);
     }
     settings = old.settings;
     settings.threads = request.settings.threads;
@@ -386,7 +435,8 @@ TrainResult train_avatar(const TrainRequest& request) {
               .was_finished = true};
     }
   }
-  const dataset::Dataset data = dataset::Dataset::open(request.data, {.body = &body.package.body(), .body_hash = body_hash});
+  const dataset::Dataset data =
+      dataset::Dataset::open(request.data, {.body = &body.package.body(), .body_hash = body_hash});
   if (!exists) {
     description = describe(request, settings, body, data);
     description.update(request.notes);

@@ -1,12 +1,13 @@
 // The paper's first stage: fits one person's UNet to the person's images.
 //
-// Every iteration draws one image of one training pose: pose maps -> UNet -> Gaussians -> picture -> L1 + 0.1 SSIM + 0.1 mask -> optimiser.
-// The picture is cropped to the true mask with a margin; every 16th iteration looks at the whole image, so that nothing can hide outside.
-// LPIPS (0.01 in the paper) is left out: no pretrained AlexNet comes with the platform. Saves a checkpoint every half minute and when
-// interrupted.
+// Every iteration draws one image of one training pose: pose maps -> UNet -> Gaussians -> picture
+// -> L1 + 0.1 SSIM + 0.1 mask -> optimiser. The picture is cropped to the true mask with a margin;
+// every 16th iteration looks at the whole image, so that nothing can hide outside. LPIPS (0.01 in
+// the paper) is left out: no pretrained AlexNet comes with the platform. Saves a checkpoint every
+// half minute and when interrupted.
 //
-// Based on: the paper, section 4.1 and implementation details; Pang et al., ASH: Animatable Gaussian Splats for Efficient and Photoreal
-// Human Rendering, 2024 (the warm-up).
+// Based on: the paper, section 4.1 and implementation details; Pang et al., ASH: Animatable
+// Gaussian Splats for Efficient and Photoreal Human Rendering, 2024 (the warm-up).
 #pragma once
 
 #include <memory>
@@ -28,12 +29,14 @@ struct TrainRequest {
   std::string run;   // folder to write
   TrainSettings settings;
   std::string command;  // as typed, for run.json
-  bool resume = false;  // goes on from the run's checkpoint, by the run's own settings; only settings.threads counts
+  bool resume = false;  // goes on from the run's checkpoint, by the run's own settings; only
+                        // settings.threads counts
   bool quiet = false;
   double checkpoint_period_s = 30;
-  uint64_t stop_after = 0;                                           // interrupt before this iteration, as Ctrl-C would; 0: never (tests)
-  std::shared_ptr<const model::FakeQuantisation> fake_quantisation;  // of the UNet while training; needs settings.bf16 off. Null: none
-  nlohmann::json notes = nlohmann::json::object();                   // further entries of a new run's run.json
+  uint64_t stop_after = 0;  // interrupt before this iteration, as Ctrl-C would; 0: never (tests)
+  std::shared_ptr<const model::FakeQuantisation>
+      fake_quantisation;  // of the UNet while training; needs settings.bf16 off. Null: none
+  nlohmann::json notes = nlohmann::json::object();  // further entries of a new run's run.json
 };
 
 struct TrainResult {
@@ -43,8 +46,8 @@ struct TrainResult {
   bool was_finished = false;  // nothing was left to do
 };
 
-// Throws InputError (bad input, a run that is already there, no space left, a loss that is not finite: the last good checkpoint stays) or
-// Interrupted (state saved).
+// Throws InputError (bad input, a run that is already there, no space left, a loss that is not
+// finite: the last good checkpoint stays) or Interrupted (state saved).
 TrainResult train_avatar(const TrainRequest& request);
 
 // run.json as it describes the person and the body, for evaluation and packing.

@@ -1,5 +1,6 @@
-// An avatar as the device draws it, for tools that have an Avatar but no trainer: a population's members, or weights that no package holds.
-// The network runs once a pose, however many cameras look.
+// An avatar as the device draws it, for tools that have an Avatar but no trainer: a population's
+// members, or weights that no package holds. The network runs once a pose, however many cameras
+// look.
 #pragma once
 
 #include <array>
@@ -23,13 +24,15 @@ namespace figurine::verify {
 
 class DeviceAvatar {
  public:
-  // In float, on one thread. The avatar's arrays and the body are borrowed. Throws InputError if the avatar does not fit the body.
+  // In float, on one thread. The avatar's arrays and the body are borrowed. Throws InputError if
+  // the avatar does not fit the body.
   DeviceAvatar(const Avatar& avatar, const Package& body);
   ~DeviceAvatar();
   DeviceAvatar(const DeviceAvatar&) = delete;
   DeviceAvatar& operator=(const DeviceAvatar&) = delete;
 
-  // Runs the network; what is drawn next is in this pose. Throws InputError on a pose that is not one.
+  // Runs the network; what is drawn next is in this pose. Throws InputError on a pose that is not
+  // one.
   void pose(const PoseView& pose);
   // World centres of the posed Gaussians, [n,3]; valid until the next pose.
   std::span<const float> centres_m() const { return position_m_; }
@@ -40,7 +43,8 @@ class DeviceAvatar {
   std::unique_ptr<Renderer> renderer_;
   AvatarId avatar_{};
   uint32_t sh_degree_ = 0;
-  std::vector<float> position_m_, covariance_factor_, opacity_, sh_;  // copies: the renderer's are valid until its next call
+  std::vector<float> position_m_, covariance_factor_, opacity_,
+      sh_;  // copies: the renderer's are valid until its next call
 };
 
 }  // namespace figurine::verify

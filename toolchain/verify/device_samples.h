@@ -1,4 +1,5 @@
-// The people of a sampler package, as a device samples them: what ships, for evaluations that need no run folder.
+// The people of a sampler package, as a device samples them: what ships, for evaluations that need
+// no run folder.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +16,9 @@ struct DeviceSamplesOptions {
   bool quiet = false;
 };
 
-// Seeds first_seed, first_seed + 1, ...: [S,W] weights before they are rounded to an avatar's int8, in the order of a population's members.
-// sampler: of an opened package. Throws InputError if one cannot be sampled, or train::Interrupted.
+// Seeds first_seed, first_seed + 1, ...: [S,W] weights before they are rounded to an avatar's int8,
+// in the order of a population's members. sampler: of an opened package. Throws InputError if one
+// cannot be sampled, or train::Interrupted.
 evaluate::RowMatrix sample_weights(const Sampler& sampler, const DeviceSamplesOptions& options);
 
 }  // namespace figurine::verify

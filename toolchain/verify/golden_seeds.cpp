@@ -7,11 +7,13 @@
 namespace figurine::verify {
 
 std::vector<GoldenSeed> sample_golden_seeds(const Sampler& sampler, uint32_t count) {
-  const std::unique_ptr<AvatarSampler> device = value_or_throw(AvatarSampler::create(sampler), sampler.name);
+  const std::unique_ptr<AvatarSampler> device =
+      value_or_throw(AvatarSampler::create(sampler), sampler.name);
   std::vector<GoldenSeed> golden;
   SampledAvatar person;
   for (uint64_t seed = 0; seed < count; ++seed) {
-    throw_if_error(device->sample({.seed = seed}, person), sampler.name + ": seed " + std::to_string(seed));
+    throw_if_error(device->sample({.seed = seed}, person),
+                   sampler.name + ": seed " + std::to_string(seed));
     golden.push_back({.seed = seed,
                       .steps = sampler.steps,
                       .method = sampler.method,

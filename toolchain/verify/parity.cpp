@@ -20,7 +20,8 @@ struct Errors {
   uint64_t foreground = 0;
   double psnr_db() const {
     if (foreground == 0) return std::numeric_limits<double>::quiet_NaN();
-    return sum == 0 ? std::numeric_limits<double>::infinity() : -10 * std::log10(sum / (4.0 * static_cast<double>(foreground)));
+    return sum == 0 ? std::numeric_limits<double>::infinity()
+                    : -10 * std::log10(sum / (4.0 * static_cast<double>(foreground)));
   }
 };
 
@@ -57,10 +58,14 @@ std::vector<std::pair<size_t, size_t>> choose_views(const dataset::Dataset& data
 
 }  // namespace
 
-ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Avatar& device, const ParityOptions& options) {
-  const std::unique_ptr<Renderer> renderer = value_or_throw(Renderer::create({.threads = options.threads}), "runtime");
-  const AvatarId id = value_or_throw(renderer->add_avatar(device, avatar.body_file().package, options.precision), "runtime");
-  if (options.precision == Precision::kFixedPoint) quantize::imitate(device.fixed_point, avatar.model().unet());
+ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Avatar& device,
+                                  const ParityOptions& options) {
+  const std::unique_ptr<Renderer> renderer =
+      value_or_throw(Renderer::create({.threads = options.threads}), "runtime");
+  const AvatarId id = value_or_throw(
+      renderer->add_avatar(device, avatar.body_file().package, options.precision), "runtime");
+  if (options.precision == Precision::kFixedPoint)
+    quantize::imitate(device.fixed_point, avatar.model().unet());
   const dataset::Dataset& data = avatar.data();
   ParityReport report;
   Errors pooled;
@@ -69,18 +74,22 @@ ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Avatar& de
     const Camera& view = data.cameras()[camera].camera;
     const train::OwnedPose pose = avatar.model().from_capture(data.frames()[frame]);
     const train::PosedBody posed = avatar.model().pose(pose.view());
-    const std::vector<float> trainer = avatar.model().render_rgba(avatar.model().evaluate(posed), posed, view);
+    const std::vector<float> trainer =
+        avatar.model().render_rgba(avatar.model().evaluate(posed), posed, view);
     std::vector<float> runtime(trainer.size());
     const FrameAvatar seen[] = {{.avatar = id, .pose = pose.view()}};
-    const Frame picture{.camera = view, .avatars = seen, .gaussians = {}, .background = {}, .splat = {}};
-    throw_if_error(
-        renderer->render(picture,
-                         {.pixels = runtime.data(), .stride_bytes = 4 * sizeof(float) * view.width_px, .format = PixelFormat::kRgbaF32}),
-        "runtime");
+    const Frame picture{
+        .camera = view, .avatars = seen, .gaussians = {}, .background = {}, .splat = {}};
+    throw_if_error(renderer->render(picture, {.pixels = runtime.data(),
+                                              .stride_bytes = 4 * sizeof(float) * view.width_px,
+                                              .format = PixelFormat::kRgbaF32}),
+                   "runtime");
     const Errors errors = compare(trainer, runtime);
-    report.views.push_back(
-        {std::to_string(data.frames()[frame].number), data.cameras()[camera].name, errors.psnr_db(), errors.largest, errors.foreground});
-    if (errors.foreground > 0) report.worst_psnr_db = std::min(report.worst_psnr_db, errors.psnr_db());
+    report.views.push_back({std::to_string(data.frames()[frame].number),
+                            data.cameras()[camera].name, errors.psnr_db(), errors.largest,
+                            errors.foreground});
+    if (errors.foreground > 0)
+      report.worst_psnr_db = std::min(report.worst_psnr_db, errors.psnr_db());
     pooled.sum += errors.sum;
     pooled.foreground += errors.foreground;
     if (!(errors.largest <= pooled.largest)) pooled.largest = errors.largest;
@@ -97,13 +106,20 @@ GoldenRun draw_golden_frame(const Package& avatar, const Package& body) {
   std::vector<uint8_t> pixels(size_t(camera.width_px) * camera.height_px * 4);
   for (Precision precision : {Precision::kFloat32, Precision::kFixedPoint}) {
     if (!avatar.avatar().holds(precision)) continue;
-    const std::unique_ptr<Renderer> renderer = value_or_throw(Renderer::create({.threads = 1}), "runtime");
+    const std::unique_ptr<Renderer> renderer =
+        value_or_throw(Renderer::create({.threads = 1}), "runtime");
     const AvatarId id = value_or_throw(renderer->add_avatar(avatar, body, precision), "runtime");
-    const FrameAvatar seen[] = {{.avatar = id, .pose = {golden.root_translation_m, golden.rotations}}};
-    const Frame picture{.camera = camera, .avatars = seen, .gaussians = {}, .background = golden.background, .splat = {}};
-    throw_if_error(
-        renderer->render(picture, {.pixels = pixels.data(), .stride_bytes = 4 * size_t(camera.width_px), .format = PixelFormat::kRgba8}),
-        "runtime");
+    const FrameAvatar seen[] = {
+        {.avatar = id, .pose = {golden.root_translation_m, golden.rotations}}};
+    const Frame picture{.camera = camera,
+                        .avatars = seen,
+                        .gaussians = {},
+                        .background = golden.background,
+                        .splat = {}};
+    throw_if_error(renderer->render(picture, {.pixels = pixels.data(),
+                                              .stride_bytes = 4 * size_t(camera.width_px),
+                                              .format = PixelFormat::kRgba8}),
+                   "runtime");
     run.memory_bytes = std::max(run.memory_bytes, renderer->memory_bytes());
     if (precision == Precision::kFixedPoint) run.fixed_point_hash = hash_picture(pixels);
   }

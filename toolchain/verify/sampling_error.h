@@ -1,5 +1,6 @@
-// What the number of evaluations costs and buys: the error of sampled weights, and of the pictures of sampled people, against the exact
-// solution of the same denoiser; for the closed-form oracle in double, the trained network in float, and the device's in integers.
+// What the number of evaluations costs and buys: the error of sampled weights, and of the pictures
+// of sampled people, against the exact solution of the same denoiser; for the closed-form oracle in
+// double, the trained network in float, and the device's in integers.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +19,13 @@ struct SamplingErrorOptions {
   bool quiet = false;
 };
 
-// Rows {denoiser, solver, evaluations, rms_error, seconds}: rms over values of unit scale, seconds of one vector on the calling thread;
-// integer rows also {float_rms_error, picture_db}: against the float network's exact solution, and the PSNR of the person's pictures
-// against those of the exact one. Objects `order`: observed slopes between 50 and 250 evaluations, `floor`: where the integers' error ends.
-// sampler: the trained one's package. Throws InputError.
-nlohmann::json measure_sampling_error(const generate::TrainedSampler& trained, const Sampler& sampler, const Package& body,
+// Rows {denoiser, solver, evaluations, rms_error, seconds}: rms over values of unit scale, seconds
+// of one vector on the calling thread; integer rows also {float_rms_error, picture_db}: against the
+// float network's exact solution, and the PSNR of the person's pictures against those of the exact
+// one. Objects `order`: observed slopes between 50 and 250 evaluations, `floor`: where the
+// integers' error ends. sampler: the trained one's package. Throws InputError.
+nlohmann::json measure_sampling_error(const generate::TrainedSampler& trained,
+                                      const Sampler& sampler, const Package& body,
                                       const SamplingErrorOptions& options);
 
 }  // namespace figurine::verify

@@ -1,4 +1,5 @@
-// An avatar: the weights of one pose UNet, how its input is standardised and its head is decoded, and the person's shape.
+// An avatar: the weights of one pose UNet, how its input is standardised and its head is decoded,
+// and the person's shape.
 #pragma once
 
 #include <array>
@@ -14,22 +15,25 @@
 
 namespace figurine {
 
-// Which canonical texels and joints the Gaussians sit on. The network's input is the mean template's in both cases.
+// Which canonical texels and joints the Gaussians sit on. The network's input is the mean
+// template's in both cases.
 enum class TemplateMode : uint8_t { kMean, kShaped };
 
 // Head channels to Gaussians, per texel i with raw outputs h:
-//   offset = offset_scale_m * h[0:3];   scale = spacing_scale * texel_spacing_m[i] * exp(clamp(h[3:6], -max_log_scale, max_log_scale));
-//   quaternion = (1,0,0,0) + h[6:10], normalised;   opacity = 1 / (1 + exp(-(h[10] + opacity_bias)));   SH = h[11:].
+//   offset = offset_scale_m * h[0:3];   scale = spacing_scale * texel_spacing_m[i] *
+//   exp(clamp(h[3:6], -max_log_scale, max_log_scale)); quaternion = (1,0,0,0) + h[6:10],
+//   normalised;   opacity = 1 / (1 + exp(-(h[10] + opacity_bias)));   SH = h[11:].
 struct HeadDecoding {
   float offset_scale_m = 0.05f;
   float spacing_scale = 0.6f;
-  float max_log_scale = 4.0f;  // bounds what a pose far outside the training range can do; never active on trained poses
+  float max_log_scale = 4.0f;  // bounds what a pose far outside the training range can do; never
+                               // active on trained poses
   float opacity_bias = 2.0f;
   uint32_t sh_degree = 0;
 };
 
-// Mean and covariance of the training poses' body rotations, for telling how unusual a pose is: features are rotation vectors (axis times
-// angle, radians) of the listed joints, concatenated.
+// Mean and covariance of the training poses' body rotations, for telling how unusual a pose is:
+// features are rotation vectors (axis times angle, radians) of the listed joints, concatenated.
 struct PoseStatistics {
   std::vector<uint8_t> joints;        // [P]
   std::span<const float> mean;        // [3P]
@@ -45,8 +49,10 @@ struct GoldenFrame {
   std::span<const float> rotations;  // [J,4]
   Camera camera;
   std::array<float, 3> background{0.5f, 0.5f, 0.5f};
-  std::span<const uint8_t> png;  // 8-bit RGB of the trainer's renderer over the background; may be empty
-  // XXH3-128 (low, high) of the frame in fixed point: RGBA8 rows over the background, equal on every CPU. Zero: none.
+  std::span<const uint8_t>
+      png;  // 8-bit RGB of the trainer's renderer over the background; may be empty
+  // XXH3-128 (low, high) of the frame in fixed point: RGBA8 rows over the background, equal on
+  // every CPU. Zero: none.
   std::array<uint64_t, 2> fixed_point_hash{0, 0};
   std::string fixed_point_library;  // the network library that the hash was made with, for people
 };
@@ -67,7 +73,9 @@ struct Avatar {
   GoldenFrame golden;
 
   // A package holds one or both.
-  bool holds(Precision precision) const { return precision == Precision::kFixedPoint ? !fixed_point.empty() : has_weights(network); }
+  bool holds(Precision precision) const {
+    return precision == Precision::kFixedPoint ? !fixed_point.empty() : has_weights(network);
+  }
 };
 
 }  // namespace figurine

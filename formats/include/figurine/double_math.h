@@ -1,8 +1,10 @@
-// exp, expm1, log, sine and cosine in double, of our own: what places noise levels and draws noise gives the same bits on every CPU.
+// exp, expm1, log, sine and cosine in double, of our own: what places noise levels and draws noise
+// gives the same bits on every CPU.
 //
-// Exactly rounded IEEE operations in a fixed order, as the runtime's float_math.h. Plain power series, cut where the next term is below
-// half a bit: a level or a random number is worth a few more multiplications, and no constant has to be believed. Errors are the largest
-// that double_math_test finds against libm, over dense samples of the stated range.
+// Exactly rounded IEEE operations in a fixed order, as the runtime's float_math.h. Plain power
+// series, cut where the next term is below half a bit: a level or a random number is worth a few
+// more multiplications, and no constant has to be believed. Errors are the largest that
+// double_math_test finds against libm, over dense samples of the stated range.
 #pragma once
 
 #include <bit>
@@ -13,8 +15,8 @@ namespace figurine {
 
 namespace double_math {
 
-// ln 2 in two parts, the first with 32 significant bits so that n * kLn2High is exact (Cody and Waite, Software Manual for the Elementary
-// Functions, 1980).
+// ln 2 in two parts, the first with 32 significant bits so that n * kLn2High is exact (Cody and
+// Waite, Software Manual for the Elementary Functions, 1980).
 inline constexpr double kLn2High = 0x1.62e42feep-1, kLn2Low = 0x1.a39ef35793c76p-33;
 inline constexpr double kLog2E = 0x1.71547652b82fep+0, kHalfPi = 0x1.921fb54442d18p+0;
 
@@ -36,7 +38,8 @@ inline double expm1_fraction(double r) {
 
 }  // namespace double_math
 
-// e^x for all doubles: 0 below the normal range, inf above it, NaN for NaN. Largest relative error 2e-16.
+// e^x for all doubles: 0 below the normal range, inf above it, NaN for NaN. Largest relative error
+// 2e-16.
 inline double exp_double(double x) {
   using namespace double_math;
   if (!(x > -708.0)) return x != x ? x : 0.0;
@@ -57,7 +60,8 @@ inline double expm1_double(double x) {
 // ln x for normal x > 0. Largest relative error 2e-16.
 inline double log_double(double x) {
   using namespace double_math;
-  // x = 2^n m, m in [sqrt(1/2), sqrt(2)), and ln m = 2 artanh((m - 1) / (m + 1)) = 2 (s + s^3/3 + ... + s^23/23).
+  // x = 2^n m, m in [sqrt(1/2), sqrt(2)), and ln m = 2 artanh((m - 1) / (m + 1)) = 2 (s + s^3/3 +
+  // ... + s^23/23).
   const int64_t bits = std::bit_cast<int64_t>(x);
   constexpr int64_t kSqrtHalf = 0x3fe6a09e667f3bcd;
   const int64_t n = (bits - kSqrtHalf) >> 52;
@@ -78,7 +82,8 @@ struct SineCosine {
 inline SineCosine sine_cosine_of_turns(double turns) {
   using namespace double_math;
   const double quarter = round_small(turns * 4.0);
-  const double a = (turns * 4.0 - quarter) * kHalfPi, a2 = a * a;  // |a| <= pi/4; the difference is exact
+  const double a = (turns * 4.0 - quarter) * kHalfPi,
+               a2 = a * a;  // |a| <= pi/4; the difference is exact
   double s = 0, c = 0;
   for (int k = 17; k >= 3; k -= 2) s = (1.0 + s) * (-a2 / (k * (k - 1)));
   for (int k = 18; k >= 2; k -= 2) c = (1.0 + c) * (-a2 / (k * (k - 1)));

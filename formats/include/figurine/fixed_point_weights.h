@@ -1,5 +1,5 @@
-// A float network to integers: what the packer does with a trained avatar and the device with a sampled one, in one arithmetic
-// (docs/numerics.md, "Fixed point"). The same bits on every CPU.
+// A float network to integers: what the packer does with a trained avatar and the device with a
+// sampled one, in one arithmetic (docs/numerics.md, "Fixed point"). The same bits on every CPU.
 #pragma once
 
 #include <cstdint>
@@ -24,11 +24,12 @@ struct OutputWeights {
 // The scale that puts the largest weight at 127; 0 for weights of zero.
 float max_abs_scale(std::span<const float> weights);
 
-// The scale, raised where fixed point needs it: weights of zero, a bias that is large against the weights, a multiplier below XNNPACK's
-// smallest, a sum that could overflow.
+// The scale, raised where fixed point needs it: weights of zero, a bias that is large against the
+// weights, a multiplier below XNNPACK's smallest, a sum that could overflow.
 float raise_weight_scale(float scale, const OutputWeights& output);
 
-// Calls use(layer, output, OutputWeights) for every output of every convolution. values: [layers]; network: with weights.
+// Calls use(layer, output, OutputWeights) for every output of every convolution. values: [layers];
+// network: with weights.
 template <class Use>
 void for_each_output(const Network& network, std::span<const Quantisation> values, const Use& use) {
   for (size_t i = 0; i < network.layers.size(); ++i) {
@@ -50,11 +51,13 @@ void for_each_output(const Network& network, std::span<const Quantisation> value
 // Owns what a FixedPointNetwork borrows.
 class FixedPointStorage {
  public:
-  // Scales of max_abs_scale, raised where needed. values: [layers]. kCorrupt "fixed point: ..." if the result is not sound
-  // (validate_fixed_point), e.g. for weights that are not finite; kInvalidArgument if the network has no weights.
+  // Scales of max_abs_scale, raised where needed. values: [layers]. kCorrupt "fixed point: ..." if
+  // the result is not sound (validate_fixed_point), e.g. for weights that are not finite;
+  // kInvalidArgument if the network has no weights.
   Status quantise(const Network& network, std::span<const Quantisation> values);
   // With given scales: [layers][out], empty for layers without weights.
-  Status quantise(const Network& network, std::span<const Quantisation> values, std::vector<std::vector<float>> weight_scale);
+  Status quantise(const Network& network, std::span<const Quantisation> values,
+                  std::vector<std::vector<float>> weight_scale);
 
   FixedPointNetwork view() const;  // borrows from this object
 

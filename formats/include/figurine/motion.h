@@ -21,7 +21,8 @@ struct Motion {
 
   PoseView pose(uint32_t frame) const {
     const size_t joints = joint_names.size();
-    return {{root_translation_m[frame * 3], root_translation_m[frame * 3 + 1], root_translation_m[frame * 3 + 2]},
+    return {{root_translation_m[frame * 3], root_translation_m[frame * 3 + 1],
+             root_translation_m[frame * 3 + 2]},
             rotations.subspan(frame * joints * 4, joints * 4)};
   }
 };

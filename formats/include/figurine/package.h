@@ -1,10 +1,11 @@
-// Reads a .fgn package: 64-byte header, flatbuffer index, 64-byte-aligned blobs (docs/package.md; formats/schema/package.fbs is the manual
-// of the index).
+// Reads a .fgn package: 64-byte header, flatbuffer index, 64-byte-aligned blobs (docs/package.md;
+// formats/schema/package.fbs is the manual of the index).
 //
-// Opening verifies in stages and always: size, magic, version, exact length, ranges, checksums (XXH3-64 of the index and of every blob),
-// the flatbuffers Verifier with tight limits, then meaning (shapes x type = bytes, finite values, positive scales, parents before children,
-// declared budgets). After that no access can fail, and views point into the caller's bytes: keep them mapped and unchanged while a view
-// lives.
+// Opening verifies in stages and always: size, magic, version, exact length, ranges, checksums
+// (XXH3-64 of the index and of every blob), the flatbuffers Verifier with tight limits, then
+// meaning (shapes x type = bytes, finite values, positive scales, parents before children, declared
+// budgets). After that no access can fail, and views point into the caller's bytes: keep them
+// mapped and unchanged while a view lives.
 #pragma once
 
 #include <array>
@@ -29,18 +30,34 @@ inline constexpr size_t kPackageHeaderBytes = 64;
 inline constexpr size_t kBlobAlignment = 64;
 
 // Bits of the header's required features.
-inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1} << 0;  // an avatar's network is there in fixed point
+inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1}
+                                               << 0;  // an avatar's network is there in fixed point
 
-enum class PackageKind : uint8_t { kBody = 1, kAvatar = 2, kMotion = 3, kPopulation = 4, kSampler = 5 };
+enum class PackageKind : uint8_t {
+  kBody = 1,
+  kAvatar = 2,
+  kMotion = 3,
+  kPopulation = 4,
+  kSampler = 5
+};
 const char* to_string(PackageKind kind);
 
-enum class DataType : uint8_t { kF32 = 0, kU8 = 1, kI16 = 2, kU32 = 3, kI8 = 4, kI32 = 5, kF16 = 6 };
+enum class DataType : uint8_t {
+  kF32 = 0,
+  kU8 = 1,
+  kI16 = 2,
+  kU32 = 3,
+  kI8 = 4,
+  kI32 = 5,
+  kF16 = 6
+};
 const char* to_string(DataType type);
 size_t size_bytes(DataType type);
 
 // What a device needs to know before it loads.
 struct Budget {
-  uint64_t peak_memory_bytes = 0;  // of the runtime for one instance, image and package excluded; 0: not applicable
+  uint64_t peak_memory_bytes =
+      0;  // of the runtime for one instance, image and package excluded; 0: not applicable
   uint64_t macs_per_frame = 0;
   uint32_t gaussians = 0;
 };
@@ -65,7 +82,8 @@ struct Provenance {
   std::string licence_name;
   std::string licence_url;
   std::vector<std::string> authors;
-  std::string avatar_permission;  // who may perform: "onlyAuthor", "onlySeparatelyLicensedPerson", "everyone"
+  std::string avatar_permission;  // who may perform: "onlyAuthor", "onlySeparatelyLicensedPerson",
+                                  // "everyone"
   std::string commercial_usage;   // "personalNonProfit", "personalProfit", "corporation"
   std::string depicted_person;    // "synthetic", or how consent was given
 };
@@ -88,7 +106,8 @@ struct TensorInfo {
 
 class Package {
  public:
-  // bytes must be 64-byte aligned (a memory map or an aligned buffer is) and outlive the Package. name appears in messages.
+  // bytes must be 64-byte aligned (a memory map or an aligned buffer is) and outlive the Package.
+  // name appears in messages.
   static Result<Package> open(std::span<const std::byte> bytes, const std::string& name);
 
   Package(Package&&) noexcept;
@@ -99,7 +118,8 @@ class Package {
   uint32_t version() const;
   uint64_t required_features() const;
   uint64_t optional_features() const;
-  // XXH3-128 over header and index; the index holds every blob's checksum, so it names the whole content. (low, high)
+  // XXH3-128 over header and index; the index holds every blob's checksum, so it names the whole
+  // content. (low, high)
   std::array<uint64_t, 2> content_hash() const;
 
   const Body& body() const;              // kind must be kBody
@@ -109,7 +129,8 @@ class Package {
   const Sampler& sampler() const;        // kind must be kSampler
   const Budget& budget() const;
   const Provenance& provenance() const;
-  // Of a population's member: the package's, with what is the member's own, its quality among it. kind must be kPopulation.
+  // Of a population's member: the package's, with what is the member's own, its quality among it.
+  // kind must be kPopulation.
   Provenance member_provenance(size_t member) const;
   const std::vector<TensorInfo>& tensors() const;
   uint64_t size_bytes() const;
@@ -123,11 +144,13 @@ class Package {
 std::string format_hash(const std::array<uint64_t, 2>& hash);  // 32 hex digits
 // Of GoldenFrame::fixed_point_hash: XXH3-128 (low, high) of RGBA8 rows without gaps.
 std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8);
-// Of GoldenSeed::hash: XXH3-128 (low, high) of all that an avatar in fixed point is decided by: per convolution its weights, their scales
-// and its biases as they lie in memory, then the shape coefficients.
+// Of GoldenSeed::hash: XXH3-128 (low, high) of all that an avatar in fixed point is decided by: per
+// convolution its weights, their scales and its biases as they lie in memory, then the shape
+// coefficients.
 std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape);
 
-// An avatar fits a body if the hash, the UV size, the shape count and the golden pose's joint count do. kMismatch names both hashes.
+// An avatar fits a body if the hash, the UV size, the shape count and the golden pose's joint count
+// do. kMismatch names both hashes.
 Status check_avatar_fits_body(const Avatar& avatar, const Package& body);
 Status check_motion_fits_body(const Motion& motion, const Body& body);
 

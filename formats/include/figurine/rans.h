@@ -1,10 +1,13 @@
-// Entropy coding of int8 values in [-127, 127]: one stream of bytes, the values' frequencies known to both sides.
+// Entropy coding of int8 values in [-127, 127]: one stream of bytes, the values' frequencies known
+// to both sides.
 //
-// Based on: Duda, Asymmetric numeral systems, 2013; byte-wise renormalisation as in Giesen's rans_byte. The state is 32 bits in [2^23,
-// 2^31), frequencies are multiples of 2^-14. A stream is the state, u32, and the bytes that the decoder takes in, in that order.
+// Based on: Duda, Asymmetric numeral systems, 2013; byte-wise renormalisation as in Giesen's
+// rans_byte. The state is 32 bits in [2^23, 2^31), frequencies are multiples of 2^-14. A stream is
+// the state, u32, and the bytes that the decoder takes in, in that order.
 //
-// The decoder is total: it makes a value in [-127, 127] of whatever bytes it is given, zeros where they end. Damage is the checksum's to
-// find; a forged stream decodes to other weights, never to a failure.
+// The decoder is total: it makes a value in [-127, 127] of whatever bytes it is given, zeros where
+// they end. Damage is the checksum's to find; a forged stream decodes to other weights, never to a
+// failure.
 #pragma once
 
 #include <array>
@@ -17,7 +20,8 @@ namespace figurine {
 inline constexpr uint32_t kRansBits = 14;
 inline constexpr uint32_t kRansTotal = 1u << kRansBits;
 inline constexpr uint32_t kRansLow = 1u << 23;
-inline constexpr size_t kRansValues = 255;  // entry k of a list of frequencies is that of the value k - 127
+inline constexpr size_t kRansValues =
+    255;  // entry k of a list of frequencies is that of the value k - 127
 
 struct RansTable {
   std::array<uint32_t, kRansValues> frequency{}, start{};
@@ -29,7 +33,8 @@ struct RansTable {
     for (size_t k = 0; k < kRansValues; ++k) {
       frequency[k] = static_cast<uint32_t>(frequencies[k]);
       start[k] = slot;
-      for (const uint32_t end = slot + frequency[k]; slot < end; ++slot) entry[slot] = static_cast<uint8_t>(k);
+      for (const uint32_t end = slot + frequency[k]; slot < end; ++slot)
+        entry[slot] = static_cast<uint8_t>(k);
     }
   }
 };
@@ -43,7 +48,8 @@ class RansDecoder {
   int32_t next(const RansTable& table) {
     const uint32_t slot = state_ & (kRansTotal - 1), k = table.entry[slot];
     state_ = table.frequency[k] * (state_ >> kRansBits) + slot - table.start[k];
-    for (int taken = 0; taken < 2 && state_ < kRansLow; ++taken) state_ = state_ << 8 | next_byte();  // a sound stream never needs a third
+    for (int taken = 0; taken < 2 && state_ < kRansLow; ++taken)
+      state_ = state_ << 8 | next_byte();  // a sound stream never needs a third
     return static_cast<int32_t>(k) - 127;
   }
 

@@ -1,7 +1,9 @@
-// Errors as values, for everything that comes from outside: packages, data sets, motions, command lines, the machine itself.
+// Errors as values, for everything that comes from outside: packages, data sets, motions, command
+// lines, the machine itself.
 //
-// A Status says what went wrong (code), and in one line which file or field and why (message). Result<T> is a value or a Status. Nothing
-// here throws; the runtime is built without exceptions. Broken contracts of callers are FIG_CHECK's (check.h).
+// A Status says what went wrong (code), and in one line which file or field and why (message).
+// Result<T> is a value or a Status. Nothing here throws; the runtime is built without exceptions.
+// Broken contracts of callers are FIG_CHECK's (check.h).
 #pragma once
 
 #include <cstdint>
@@ -39,7 +41,9 @@ class [[nodiscard]] Status {
   const std::string& message() const { return message_; }
 
   // The same error seen from further out: "where: message".
-  Status within(const std::string& where) const { return ok() ? *this : Status(code_, where + ": " + message_); }
+  Status within(const std::string& where) const {
+    return ok() ? *this : Status(code_, where + ": " + message_);
+  }
 
  private:
   StatusCode code_ = StatusCode::kOk;
@@ -50,7 +54,9 @@ template <class T>
 class [[nodiscard]] Result {
  public:
   Result(T value) : value_(std::move(value)) {}
-  Result(Status status) : status_(std::move(status)) { FIG_CHECK(!status_.ok(), "a Result without value needs an error"); }
+  Result(Status status) : status_(std::move(status)) {
+    FIG_CHECK(!status_.ok(), "a Result without value needs an error");
+  }
 
   bool ok() const { return value_.has_value(); }
   explicit operator bool() const { return ok(); }

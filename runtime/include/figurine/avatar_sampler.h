@@ -1,12 +1,13 @@
-// The device's sampler: a package and a seed in, the weights of an avatar that nobody has seen out. The same seed gives the same weights in
-// fixed point on every CPU.
+// The device's sampler: a package and a seed in, the weights of an avatar that nobody has seen out.
+// The same seed gives the same weights in fixed point on every CPU.
 //
 //   auto sampler = AvatarSampler::create(package.sampler());
 //   SampledAvatar person;
 //   (*sampler)->sample({.seed = 7}, person);
 //   person.avatar();   // in float and in fixed point: write it (formats/writer) or draw it
 //
-// No files, no clock, no exceptions. A sampler is used by one thread at a time; its package's bytes must outlive it and all that it made.
+// No files, no clock, no exceptions. A sampler is used by one thread at a time; its package's bytes
+// must outlive it and all that it made.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,8 @@ namespace figurine {
 
 struct SampleRequest {
   uint64_t seed = 0;
-  // The start lies `mix` (0 to 1) of the way from the noise of `seed` to that of `to`, on the arc that keeps it standard normal.
+  // The start lies `mix` (0 to 1) of the way from the noise of `seed` to that of `to`, on the arc
+  // that keeps it standard normal.
   uint64_t to = 0;
   double mix = 0;
   uint32_t steps = 0;                  // 1 to kMaxSolverSteps; 0: the package's
@@ -44,7 +46,8 @@ class SampledAvatar {
 
 class AvatarSampler {
  public:
-  // Watches a sample become an avatar: after every step, with the avatar that the denoiser believes in by then.
+  // Watches a sample become an avatar: after every step, with the avatar that the denoiser believes
+  // in by then.
   class Trace {
    public:
     virtual ~Trace() = default;
@@ -58,8 +61,8 @@ class AvatarSampler {
   AvatarSampler(const AvatarSampler&) = delete;
   AvatarSampler& operator=(const AvatarSampler&) = delete;
 
-  // kInvalidArgument for steps or a mix out of range; kCorrupt if a prediction or weight is not finite, as of a package that was trained
-  // badly. out is then of no use.
+  // kInvalidArgument for steps or a mix out of range; kCorrupt if a prediction or weight is not
+  // finite, as of a package that was trained badly. out is then of no use.
   Status sample(const SampleRequest& request, SampledAvatar& out, Trace* trace = nullptr);
 
   uint64_t memory_bytes() const;  // beside the package and SampledAvatar

@@ -1,12 +1,15 @@
-// The device's renderer: avatars and poses in, pixels out. No files, no clock, no exceptions, no allocation per frame after the first.
+// The device's renderer: avatars and poses in, pixels out. No files, no clock, no exceptions, no
+// allocation per frame after the first.
 //
 //   auto renderer = Renderer::create({.threads = 2});
 //   auto walker = (*renderer)->add_avatar(avatar_package, body_package);
 //   FrameAvatar seen[] = {{.avatar = *walker, .pose = motion.pose(12)}};
-//   (*renderer)->render({.camera = camera, .avatars = seen}, {.pixels = rgba, .stride_bytes = 4 * width, .format = PixelFormat::kRgba8});
+//   (*renderer)->render({.camera = camera, .avatars = seen}, {.pixels = rgba, .stride_bytes = 4 *
+//   width, .format = PixelFormat::kRgba8});
 //
-// A frame takes any number of avatars and static Gaussians, sorted together by view depth. Packages are borrowed: their bytes must outlive
-// the renderer. A Renderer is used by one thread at a time; it spreads its own work over its pool.
+// A frame takes any number of avatars and static Gaussians, sorted together by view depth. Packages
+// are borrowed: their bytes must outlive the renderer. A Renderer is used by one thread at a time;
+// it spreads its own work over its pool.
 #pragma once
 
 #include <array>
@@ -50,12 +53,23 @@ struct FrameAvatar {
 struct Frame {
   Camera camera;
   std::span<const FrameAvatar> avatars;
-  std::span<const GaussianView> gaussians;         // static, world space
-  std::optional<std::array<float, 3>> background;  // opaque colour behind; without it the image keeps its alpha
+  std::span<const GaussianView> gaussians;  // static, world space
+  std::optional<std::array<float, 3>>
+      background;  // opaque colour behind; without it the image keeps its alpha
   SplatOptions splat;
 };
 
-enum class Stage : uint8_t { kMaps, kNetwork, kDecode, kSkin, kProject, kBin, kSort, kBlend, kResolve };
+enum class Stage : uint8_t {
+  kMaps,
+  kNetwork,
+  kDecode,
+  kSkin,
+  kProject,
+  kBin,
+  kSort,
+  kBlend,
+  kResolve
+};
 inline constexpr size_t kStageCount = 9;
 const char* to_string(Stage stage);
 
@@ -74,8 +88,9 @@ struct RendererOptions {
   uint64_t (*now_ns)() = nullptr;
 };
 
-// The library that evaluates networks, and its version: "XNNPACK 0.20241108". Frames in fixed point are the same with every version that
-// keeps its arithmetic; where a golden hash differs, this tells whether the library does too.
+// The library that evaluates networks, and its version: "XNNPACK 0.20241108". Frames in fixed point
+// are the same with every version that keeps its arithmetic; where a golden hash differs, this
+// tells whether the library does too.
 const char* network_library();
 
 class Renderer {
@@ -85,20 +100,24 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  // Packs the network's weights and allocates what a frame of it needs. precision: fixed point if the avatar has it, otherwise float,
-  // unless said. kMismatch if the avatar was made for another body; kUnsupported if it does not hold the precision.
-  Result<AvatarId> add_avatar(const Package& avatar, const Package& body, std::optional<Precision> precision = std::nullopt);
-  // The same of an avatar that is no package of its own: a population's member (open_member). Its arrays are borrowed likewise; their
-  // meaning must have been verified, as open_member's is.
-  Result<AvatarId> add_avatar(const Avatar& avatar, const Package& body, std::optional<Precision> precision = std::nullopt);
+  // Packs the network's weights and allocates what a frame of it needs. precision: fixed point if
+  // the avatar has it, otherwise float, unless said. kMismatch if the avatar was made for another
+  // body; kUnsupported if it does not hold the precision.
+  Result<AvatarId> add_avatar(const Package& avatar, const Package& body,
+                              std::optional<Precision> precision = std::nullopt);
+  // The same of an avatar that is no package of its own: a population's member (open_member). Its
+  // arrays are borrowed likewise; their meaning must have been verified, as open_member's is.
+  Result<AvatarId> add_avatar(const Avatar& avatar, const Package& body,
+                              std::optional<Precision> precision = std::nullopt);
   Precision precision(AvatarId avatar) const;  // of an avatar that was added
 
-  // Draws one frame. kInvalidArgument on an unsound camera, pose, target or Gaussian count; nothing was drawn then. Gaussians that are not
-  // finite are left out, one by one. The same input gives the same pixels for any number of threads.
+  // Draws one frame. kInvalidArgument on an unsound camera, pose, target or Gaussian count; nothing
+  // was drawn then. Gaussians that are not finite are left out, one by one. The same input gives
+  // the same pixels for any number of threads.
   Status render(const Frame& frame, const ImageTarget& target);
 
-  // The world-space Gaussians of one avatar in one pose, as render() would splat them; valid until the next call. For export and
-  // inspection.
+  // The world-space Gaussians of one avatar in one pose, as render() would splat them; valid until
+  // the next call. For export and inspection.
   Result<GaussianView> pose_avatar(AvatarId avatar, const PoseView& pose);
 
   const FrameStatistics& statistics() const;  // of the last frame

@@ -1,11 +1,13 @@
-// Evaluates a figurine::Network in fixed point, equal to evaluate_fixed_point to the bit on every CPU and any number of threads.
+// Evaluates a figurine::Network in fixed point, equal to evaluate_fixed_point to the bit on every
+// CPU and any number of threads.
 //
-//   input [T,T,C] float -> int16 -> first convolutions (our own) -> int8 -> XNNPACK (qs8, qc8w) -> int8 -> last convolution (our own) ->
-//   float
+//   input [T,T,C] float -> int16 -> first convolutions (our own) -> int8 -> XNNPACK (qs8, qc8w) ->
+//   int8 -> last convolution (our own) -> float
 //
-// XNNPACK has neither int16 inputs nor int32 results, hence our own convolutions at both ends. They leave out what cannot matter: constant
-// channels of the input are folded once into a map of biases, a texel whose neighbourhood nothing is ever drawn into keeps the one result
-// it has, and the last layer is evaluated on the texels that are wanted alone.
+// XNNPACK has neither int16 inputs nor int32 results, hence our own convolutions at both ends. They
+// leave out what cannot matter: constant channels of the input are folded once into a map of
+// biases, a texel whose neighbourhood nothing is ever drawn into keeps the one result it has, and
+// the last layer is evaluated on the texels that are wanted alone.
 #pragma once
 
 #include <cstdint>
@@ -32,17 +34,23 @@ struct FixedPointUse {
 
 class FixedPointRunner {
  public:
-  // The network's weights are read here and not afterwards. The pool must outlive the runner. Errors: kCorrupt of validate_fixed_point;
-  // kUnsupported where XNNPACK cannot run at all or not this network; kOutOfMemory.
-  static Result<std::unique_ptr<FixedPointRunner>> create(const Network& network, const FixedPointNetwork& fixed, const FixedPointUse& use,
+  // The network's weights are read here and not afterwards. The pool must outlive the runner.
+  // Errors: kCorrupt of validate_fixed_point; kUnsupported where XNNPACK cannot run at all or not
+  // this network; kOutOfMemory.
+  static Result<std::unique_ptr<FixedPointRunner>> create(const Network& network,
+                                                          const FixedPointNetwork& fixed,
+                                                          const FixedPointUse& use,
                                                           ThreadPool& pool);
   FixedPointRunner(const FixedPointRunner&) = delete;
   FixedPointRunner& operator=(const FixedPointRunner&) = delete;
 
-  // [T,T,input_stride()], kept between runs. The first varying_channels of each texel are read; they must be zero where nothing is drawn.
+  // [T,T,input_stride()], kept between runs. The first varying_channels of each texel are read;
+  // they must be zero where nothing is drawn.
   std::span<float> input() { return input_.span(input_count_); }
   uint32_t input_stride() const { return map_.stride(); }
-  std::span<const float> output() const { return output_.span(wanted_.size() * head_.outputs()); }  // [wanted,channels]
+  std::span<const float> output() const {
+    return output_.span(wanted_.size() * head_.outputs());
+  }  // [wanted,channels]
 
   Status run();
 
@@ -61,10 +69,14 @@ class FixedPointRunner {
   };
 
   explicit FixedPointRunner(ThreadPool& pool) : pool_(pool) {}
-  Status prepare(const Network& network, const FixedPointNetwork& fixed, const FixedPointUse& use, const std::vector<ValueShape>& shapes);
-  Status prepare_first(const Network& network, const FixedPointNetwork& fixed, const FixedPointUse& use, size_t layer);
-  Status prepare_middle(const Network& network, const FixedPointNetwork& fixed, const std::vector<ValueShape>& shapes);
-  Status prepare_head(const Network& network, const FixedPointNetwork& fixed, const FixedPointUse& use, const ValueShape& input);
+  Status prepare(const Network& network, const FixedPointNetwork& fixed, const FixedPointUse& use,
+                 const std::vector<ValueShape>& shapes);
+  Status prepare_first(const Network& network, const FixedPointNetwork& fixed,
+                       const FixedPointUse& use, size_t layer);
+  Status prepare_middle(const Network& network, const FixedPointNetwork& fixed,
+                        const std::vector<ValueShape>& shapes);
+  Status prepare_head(const Network& network, const FixedPointNetwork& fixed,
+                      const FixedPointUse& use, const ValueShape& input);
   Status prepare_scratch();
 
   void quantise_row(uint32_t y);

@@ -13,7 +13,8 @@ bool PaddedMap::ensure(uint32_t size, uint32_t channels) {
   return values_.ensure(size_t(size + 2) * (size + 2) * stride_);
 }
 
-bool IntegerConvolution::prepare(const Layer& layer, const FixedPointConvolution& convolution, const ValueShape& input, uint32_t varying,
+bool IntegerConvolution::prepare(const Layer& layer, const FixedPointConvolution& convolution,
+                                 const ValueShape& input, uint32_t varying,
                                  std::span<const int16_t> constants) {
   size_ = input.size;
   kernel_ = layer.kernel;
@@ -25,7 +26,8 @@ bool IntegerConvolution::prepare(const Layer& layer, const FixedPointConvolution
   padded_outputs_ = (outputs_ + kDotsAtOnce - 1) / kDotsAtOnce * kDotsAtOnce;
   if (!weights_.ensure(padded_outputs_ * length_)) return false;
   for (size_t row = 0; row < outputs_ * taps; ++row) {
-    std::copy_n(convolution.weights.data() + row * input.channels, varying, weights_.data() + row * stride_);
+    std::copy_n(convolution.weights.data() + row * input.channels, varying,
+                weights_.data() + row * stride_);
   }
   one_bias_ = varying == input.channels;
   if (!one_bias_) return fold(layer, convolution, input.channels, constants);
@@ -34,8 +36,8 @@ bool IntegerConvolution::prepare(const Layer& layer, const FixedPointConvolution
   return true;
 }
 
-bool IntegerConvolution::fold(const Layer& layer, const FixedPointConvolution& convolution, uint32_t in_channels,
-                              std::span<const int16_t> constants) {
+bool IntegerConvolution::fold(const Layer& layer, const FixedPointConvolution& convolution,
+                              uint32_t in_channels, std::span<const int16_t> constants) {
   const uint32_t count = in_channels - varying_;
   const size_t texels = size_t{size_} * size_, taps = size_t{kernel_} * kernel_;
   if (!bias_.ensure(texels * padded_outputs_)) return false;
@@ -45,13 +47,17 @@ bool IntegerConvolution::fold(const Layer& layer, const FixedPointConvolution& c
   PaddedMap map;
   std::vector<int8_t> weights(outputs_ * taps * count);
   for (size_t row = 0; row < outputs_ * taps; ++row) {
-    std::copy_n(convolution.weights.data() + row * in_channels + varying_, count, weights.data() + row * count);
+    std::copy_n(convolution.weights.data() + row * in_channels + varying_, count,
+                weights.data() + row * count);
   }
-  const FixedPointConvolution of_constants{.weights = weights, .weight_scale = convolution.weight_scale, .bias = convolution.bias};
-  if (!map.ensure(size_, count) || !rest.prepare(layer, of_constants, {size_, count}, count, {})) return false;
+  const FixedPointConvolution of_constants{
+      .weights = weights, .weight_scale = convolution.weight_scale, .bias = convolution.bias};
+  if (!map.ensure(size_, count) || !rest.prepare(layer, of_constants, {size_, count}, count, {}))
+    return false;
   for (uint32_t y = 0; y < size_; ++y) {
     for (uint32_t x = 0; x < size_; ++x) {
-      std::copy_n(constants.data() + (size_t{y} * size_ + x) * count, count, map.row(static_cast<int32_t>(y)) + x * map.stride());
+      std::copy_n(constants.data() + (size_t{y} * size_ + x) * count, count,
+                  map.row(static_cast<int32_t>(y)) + x * map.stride());
     }
   }
   Buffer<int16_t> patch;
@@ -65,20 +71,26 @@ bool IntegerConvolution::fold(const Layer& layer, const FixedPointConvolution& c
   return true;
 }
 
-void IntegerConvolution::gather(const PaddedMap& map, uint32_t x, uint32_t y, int16_t* patch) const {
+void IntegerConvolution::gather(const PaddedMap& map, uint32_t x, uint32_t y,
+                                int16_t* patch) const {
   const int32_t reach = static_cast<int32_t>(kernel_ / 2);
   const size_t row_length = kernel_ * stride_;
   for (int32_t ky = -reach; ky <= reach; ++ky) {
-    const int16_t* from = map.row(static_cast<int32_t>(y) + ky) + (ptrdiff_t{x} - reach) * static_cast<ptrdiff_t>(stride_);
-    for (size_t k = 0; k < row_length; k += kDotMultiple) std::copy_n(from + k, kDotMultiple, patch + k);
+    const int16_t* from = map.row(static_cast<int32_t>(y) + ky) +
+                          (ptrdiff_t{x} - reach) * static_cast<ptrdiff_t>(stride_);
+    for (size_t k = 0; k < row_length; k += kDotMultiple)
+      std::copy_n(from + k, kDotMultiple, patch + k);
     patch += row_length;
   }
 }
 
-void IntegerConvolution::gather(const int8_t* map, int32_t zero_point, uint32_t x, uint32_t y, int16_t* patch) const {
+void IntegerConvolution::gather(const int8_t* map, int32_t zero_point, uint32_t x, uint32_t y,
+                                int16_t* patch) const {
   const int32_t reach = static_cast<int32_t>(kernel_ / 2), size = static_cast<int32_t>(size_);
-  for (int32_t row = static_cast<int32_t>(y) - reach; row <= static_cast<int32_t>(y) + reach; ++row) {
-    for (int32_t column = static_cast<int32_t>(x) - reach; column <= static_cast<int32_t>(x) + reach; ++column, patch += stride_) {
+  for (int32_t row = static_cast<int32_t>(y) - reach; row <= static_cast<int32_t>(y) + reach;
+       ++row) {
+    for (int32_t column = static_cast<int32_t>(x) - reach;
+         column <= static_cast<int32_t>(x) + reach; ++column, patch += stride_) {
       if (row < 0 || row >= size || column < 0 || column >= size) {
         std::fill_n(patch, varying_, int16_t{0});
         continue;
@@ -92,7 +104,8 @@ void IntegerConvolution::gather(const int8_t* map, int32_t zero_point, uint32_t 
 void IntegerConvolution::sum(const int16_t* patch, uint32_t x, uint32_t y, int32_t* sums) const {
   const int32_t* bias = bias_.data() + (one_bias_ ? 0 : (size_t{y} * size_ + x) * padded_outputs_);
   std::copy_n(bias, padded_outputs_, sums);
-  for (size_t o = 0; o < padded_outputs_; o += kDotsAtOnce) add_four_dots(patch, weights_.data() + o * length_, length_, sums + o);
+  for (size_t o = 0; o < padded_outputs_; o += kDotsAtOnce)
+    add_four_dots(patch, weights_.data() + o * length_, length_, sums + o);
 }
 
 }  // namespace figurine

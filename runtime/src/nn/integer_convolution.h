@@ -1,10 +1,13 @@
-// A convolution of a network in fixed point, evaluated texel by texel to its exact int32 sums: for the two ends of the network, where
-// XNNPACK has no operator (int16 in; float out on some texels alone).
+// A convolution of a network in fixed point, evaluated texel by texel to its exact int32 sums: for
+// the two ends of the network, where XNNPACK has no operator (int16 in; float out on some texels
+// alone).
 //
-// Weights and the values under the kernel lie side by side as int16, so that a sum is a dot product of two arrays: compilers make pmaddwd
-// (SSE2) or smlal (NEON) of it. Integer sums are exact, so any order gives the same bits; validate_fixed_point says that none overflows.
+// Weights and the values under the kernel lie side by side as int16, so that a sum is a dot product
+// of two arrays: compilers make pmaddwd (SSE2) or smlal (NEON) of it. Integer sums are exact, so
+// any order gives the same bits; validate_fixed_point says that none overflows.
 //
-// Based on: Chellapilla, Puri, Simard, High Performance Convolutional Neural Networks for Document Processing, 2006 (unrolled patches).
+// Based on: Chellapilla, Puri, Simard, High Performance Convolutional Neural Networks for Document
+// Processing, 2006 (unrolled patches).
 #pragma once
 
 #include <cstdint>
@@ -16,7 +19,8 @@
 
 namespace figurine {
 
-// An int16 map with a border of one texel of zeros all around, channels rounded up to a multiple of 8 by zeros.
+// An int16 map with a border of one texel of zeros all around, channels rounded up to a multiple of
+// 8 by zeros.
 class PaddedMap {
  public:
   static uint32_t stride_of(uint32_t channels) { return (channels + 7) / 8 * 8; }
@@ -37,18 +41,25 @@ class PaddedMap {
 
 class IntegerConvolution {
  public:
-  // The layer reads maps of size x size texels of in_channels channels, of which the first `varying` are given to every evaluation and
-  // the others, constants, once: [size,size,in_channels - varying]. What these add is folded into a map of biases. False without memory.
-  bool prepare(const Layer& layer, const FixedPointConvolution& convolution, const ValueShape& input, uint32_t varying,
-               std::span<const int16_t> constants);
+  // The layer reads maps of size x size texels of in_channels channels, of which the first
+  // `varying` are given to every evaluation and the others, constants, once: [size,size,in_channels
+  // - varying]. What these add is folded into a map of biases. False without memory.
+  bool prepare(const Layer& layer, const FixedPointConvolution& convolution,
+               const ValueShape& input, uint32_t varying, std::span<const int16_t> constants);
 
   uint32_t outputs() const { return outputs_; }
-  size_t patch_length() const { return length_; }         // int16 values that a caller's patch has room for
-  size_t sums_length() const { return padded_outputs_; }  // int32 values that a caller's sums have room for
+  size_t patch_length() const {
+    return length_;
+  }  // int16 values that a caller's patch has room for
+  size_t sums_length() const {
+    return padded_outputs_;
+  }  // int32 values that a caller's sums have room for
 
-  // The values under the kernel at (x, y), outside the image zero in reals. patch: aligned to 16 bytes.
+  // The values under the kernel at (x, y), outside the image zero in reals. patch: aligned to 16
+  // bytes.
   void gather(const PaddedMap& map, uint32_t x, uint32_t y, int16_t* patch) const;
-  void gather(const int8_t* map, int32_t zero_point, uint32_t x, uint32_t y, int16_t* patch) const;  // [size,size,in_channels]
+  void gather(const int8_t* map, int32_t zero_point, uint32_t x, uint32_t y,
+              int16_t* patch) const;  // [size,size,in_channels]
 
   // All outputs' sums at (x, y), bias and constants included.
   void sum(const int16_t* patch, uint32_t x, uint32_t y, int32_t* sums) const;
@@ -56,7 +67,8 @@ class IntegerConvolution {
   uint64_t memory_bytes() const { return weights_.memory_bytes() + bias_.memory_bytes(); }
 
  private:
-  bool fold(const Layer& layer, const FixedPointConvolution& convolution, uint32_t in_channels, std::span<const int16_t> constants);
+  bool fold(const Layer& layer, const FixedPointConvolution& convolution, uint32_t in_channels,
+            std::span<const int16_t> constants);
 
   uint32_t size_ = 0, kernel_ = 0, varying_ = 0, outputs_ = 0;
   size_t stride_ = 0, length_ = 0, padded_outputs_ = 0;

@@ -14,8 +14,9 @@ namespace {
 using Task = void (*)(void*, size_t);
 
 #if defined(__SANITIZE_THREAD__)
-// The pool's library is not instrumented, so the sanitizer does not see that a loop starts after its caller's writes and ends before its
-// reads. Two marks say so; tasks of one loop stay unordered between each other, and their races are found.
+// The pool's library is not instrumented, so the sanitizer does not see that a loop starts after
+// its caller's writes and ends before its reads. Two marks say so; tasks of one loop stay unordered
+// between each other, and their races are found.
 struct Marked {
   Task task;
   void* context;
@@ -45,11 +46,14 @@ void parallelize(pthreadpool* pool, Task task, void* context, size_t count, uint
 
 Result<ThreadPool> ThreadPool::create(uint32_t threads) {
   if (threads < 1 || threads > 64) {
-    return Status(StatusCode::kInvalidArgument, "threads: must be between 1 and 64, not " + std::to_string(threads));
+    return Status(StatusCode::kInvalidArgument,
+                  "threads: must be between 1 and 64, not " + std::to_string(threads));
   }
   if (threads == 1) return ThreadPool(nullptr, 1);
   pthreadpool* handle = pthreadpool_create(threads);
-  if (handle == nullptr) return Status(StatusCode::kOutOfMemory, "threads: the system cannot start " + std::to_string(threads));
+  if (handle == nullptr)
+    return Status(StatusCode::kOutOfMemory,
+                  "threads: the system cannot start " + std::to_string(threads));
   return ThreadPool(handle, threads);
 }
 
@@ -57,12 +61,14 @@ ThreadPool::~ThreadPool() {
   if (handle_ != nullptr) pthreadpool_destroy(handle_);
 }
 
-void ThreadPool::run(size_t count, void (*task)(void*, size_t), void* context, Afterwards afterwards) {
+void ThreadPool::run(size_t count, void (*task)(void*, size_t), void* context,
+                     Afterwards afterwards) {
   if (handle_ == nullptr || count <= 1) {
     for (size_t i = 0; i < count; ++i) task(context, i);
     return;
   }
-  parallelize(handle_, task, context, count, afterwards == Afterwards::kSleep ? PTHREADPOOL_FLAG_YIELD_WORKERS : 0);
+  parallelize(handle_, task, context, count,
+              afterwards == Afterwards::kSleep ? PTHREADPOOL_FLAG_YIELD_WORKERS : 0);
 }
 
 }  // namespace figurine

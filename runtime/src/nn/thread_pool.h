@@ -1,6 +1,7 @@
 // One set of threads for everything: XNNPACK's operators and our own loops share a pthreadpool.
 //
-// Tasks of a loop are handed out dynamically, so a loop's result may depend on its own index only, never on which thread ran it.
+// Tasks of a loop are handed out dynamically, so a loop's result may depend on its own index only,
+// never on which thread ran it.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +18,8 @@ class ThreadPool {
  public:
   // 1 to 64 threads, the caller's own counted. One thread needs no pool at all.
   static Result<ThreadPool> create(uint32_t threads);
-  ThreadPool(ThreadPool&& other) noexcept : handle_(std::exchange(other.handle_, nullptr)), threads_(other.threads_) {}
+  ThreadPool(ThreadPool&& other) noexcept
+      : handle_(std::exchange(other.handle_, nullptr)), threads_(other.threads_) {}
   ThreadPool& operator=(ThreadPool&&) = delete;
   ~ThreadPool();
 
@@ -29,7 +31,9 @@ class ThreadPool {
   // task(i) for every i in [0, count), in any order, on any thread; returns when all are done.
   template <class Task>
   void for_each(size_t count, const Task& task, Afterwards afterwards = Afterwards::kSpin) {
-    run(count, [](void* context, size_t i) { (*static_cast<const Task*>(context))(i); }, const_cast<Task*>(&task), afterwards);
+    run(
+        count, [](void* context, size_t i) { (*static_cast<const Task*>(context))(i); },
+        const_cast<Task*>(&task), afterwards);
   }
 
   uint32_t threads() const { return threads_; }

@@ -18,9 +18,11 @@ Status xnnpack_status(xnn_status status, const char* what) {
     case xnn_status_out_of_memory:
       return Status(StatusCode::kOutOfMemory, std::string("XNNPACK: ") + what + ": no memory");
     case xnn_status_unsupported_hardware:
-      return Status(StatusCode::kUnsupported, std::string("XNNPACK: ") + what + ": unsupported hardware");
+      return Status(StatusCode::kUnsupported,
+                    std::string("XNNPACK: ") + what + ": unsupported hardware");
     default:
-      return Status(StatusCode::kUnsupported, std::string("XNNPACK: ") + what + ": status " + std::to_string(static_cast<int>(status)));
+      return Status(StatusCode::kUnsupported, std::string("XNNPACK: ") + what + ": status " +
+                                                  std::to_string(static_cast<int>(status)));
   }
 }
 
@@ -30,7 +32,8 @@ Status initialize_xnnpack() {
   if (status == xnn_status_success) return {};
   Status error = xnnpack_status(status, "cannot start");
   if (status == xnn_status_out_of_memory) return error;
-  return Status(error.code(), error.message() + "; it identifies the CPU through /proc, is that mounted?");
+  return Status(error.code(),
+                error.message() + "; it identifies the CPU through /proc, is that mounted?");
 }
 
 void XnnRuntimeDeleter::operator()(xnn_runtime* runtime) const { xnn_delete_runtime(runtime); }
@@ -40,27 +43,32 @@ Status GraphBuilder::build(std::span<void* const> buffers, ThreadPool& pool, Xnn
   const uint32_t external_count = static_cast<uint32_t>(plan_.inputs.size()) + 1;
   FIG_CHECK(buffers.size() == external_count, "a buffer for every input and the output");
   xnn_subgraph_t subgraph = nullptr;
-  FIG_RETURN_IF_ERROR(xnnpack_status(xnn_create_subgraph(external_count, 0, &subgraph), "creating a subgraph"));
+  FIG_RETURN_IF_ERROR(
+      xnnpack_status(xnn_create_subgraph(external_count, 0, &subgraph), "creating a subgraph"));
   subgraph_.reset(subgraph);
   FIG_RETURN_IF_ERROR(define_values());
   for (size_t i = 0; i < network_.layers.size(); ++i) {
-    if (plan_.made[i + 1]) FIG_RETURN_IF_ERROR(define_layer(i).within("layer " + std::to_string(i)));
+    if (plan_.made[i + 1])
+      FIG_RETURN_IF_ERROR(define_layer(i).within("layer " + std::to_string(i)));
   }
   xnn_runtime_t created = nullptr;
-  const xnn_status packed = xnn_create_runtime_v4(subgraph, nullptr, nullptr, pool.handle(), 0, &created);
+  const xnn_status packed =
+      xnn_create_runtime_v4(subgraph, nullptr, nullptr, pool.handle(), 0, &created);
   runtime.reset(created);
   FIG_RETURN_IF_ERROR(xnnpack_status(packed, "packing the network"));
   FIG_RETURN_IF_ERROR(xnnpack_status(xnn_reshape_runtime(created), "planning the network"));
   std::vector<xnn_external_value> values;
   for (uint32_t id = 0; id < external_count; ++id) values.push_back({id, buffers[id]});
-  return xnnpack_status(xnn_setup_runtime_v2(created, values.size(), values.data()), "setting up the network");
+  return xnnpack_status(xnn_setup_runtime_v2(created, values.size(), values.data()),
+                        "setting up the network");
 }
 
 Status GraphBuilder::define_values() {
   ids_.assign(shapes_.size(), XNN_INVALID_VALUE_ID);
   const auto define = [&](uint32_t value, uint32_t external_id, uint32_t flags) {
     const ValueShape& shape = shapes_[value];
-    return xnnpack_status(define_value(value, {1, shape.size, shape.size, shape.channels}, external_id, flags, ids_[value]),
+    return xnnpack_status(define_value(value, {1, shape.size, shape.size, shape.channels},
+                                       external_id, flags, ids_[value]),
                           "defining a value");
   };
   for (uint32_t id = 0; id < plan_.inputs.size(); ++id) {
@@ -69,8 +77,9 @@ Status GraphBuilder::define_values() {
   for (uint32_t value = 0; value < shapes_.size(); ++value) {
     if (!plan_.made[value]) continue;
     const bool is_output = value == plan_.output;
-    FIG_RETURN_IF_ERROR(define(value, is_output ? static_cast<uint32_t>(plan_.inputs.size()) : XNN_INVALID_VALUE_ID,
-                               is_output ? XNN_VALUE_FLAG_EXTERNAL_OUTPUT : 0));
+    FIG_RETURN_IF_ERROR(
+        define(value, is_output ? static_cast<uint32_t>(plan_.inputs.size()) : XNN_INVALID_VALUE_ID,
+               is_output ? XNN_VALUE_FLAG_EXTERNAL_OUTPUT : 0));
   }
   return {};
 }
@@ -82,14 +91,19 @@ Status GraphBuilder::define_layer(size_t i) {
     case LayerOp::kConv2d:
       return define_convolution(i);
     case LayerOp::kMaxPool2:
-      return xnnpack_status(
-          xnn_define_max_pooling_2d(subgraph_.get(), 0, 0, 0, 0, 2, 2, 2, 2, 1, 1, -kInfinity, kInfinity, input, output, 0), "max pool");
+      return xnnpack_status(xnn_define_max_pooling_2d(subgraph_.get(), 0, 0, 0, 0, 2, 2, 2, 2, 1, 1,
+                                                      -kInfinity, kInfinity, input, output, 0),
+                            "max pool");
     case LayerOp::kUpsample2:
-      // No flag: half-pixel centres without aligned corners, borders repeated. The flags would be TensorFlow's legacy mode and
-      // align_corners.
-      return xnnpack_status(xnn_define_static_resize_bilinear_2d(subgraph_.get(), size, size, input, output, 0), "resize");
+      // No flag: half-pixel centres without aligned corners, borders repeated. The flags would be
+      // TensorFlow's legacy mode and align_corners.
+      return xnnpack_status(
+          xnn_define_static_resize_bilinear_2d(subgraph_.get(), size, size, input, output, 0),
+          "resize");
     case LayerOp::kConcat:
-      return xnnpack_status(xnn_define_concatenate2(subgraph_.get(), 3, input, ids_[layer.inputs[1]], output, 0), "concatenation");
+      return xnnpack_status(
+          xnn_define_concatenate2(subgraph_.get(), 3, input, ids_[layer.inputs[1]], output, 0),
+          "concatenation");
   }
   return Status(StatusCode::kUnsupported, "unknown operator");
 }
@@ -98,16 +112,22 @@ Status GraphBuilder::define_convolution(size_t i) {
   const Layer& layer = network_.layers[i];
   const uint32_t in_channels = shapes_[layer.inputs[0]].channels, padding = layer.kernel / 2;
   uint32_t weights = 0, bias = 0;
+  FIG_RETURN_IF_ERROR(xnnpack_status(
+      define_weights(i, {layer.out_channels, layer.kernel, layer.kernel, in_channels}, weights),
+      "defining weights"));
   FIG_RETURN_IF_ERROR(
-      xnnpack_status(define_weights(i, {layer.out_channels, layer.kernel, layer.kernel, in_channels}, weights), "defining weights"));
-  FIG_RETURN_IF_ERROR(xnnpack_status(define_bias(i, {layer.out_channels}, bias), "defining a bias"));
-  return xnnpack_status(xnn_define_convolution_2d(subgraph_.get(), padding, padding, padding, padding, layer.kernel, layer.kernel, 1, 1, 1,
-                                                  1, 1, in_channels, layer.out_channels, layer.relu ? 0.0f : -kInfinity, kInfinity,
-                                                  ids_[layer.inputs[0]], weights, bias, ids_[i + 1], 0),
-                        "convolution");
+      xnnpack_status(define_bias(i, {layer.out_channels}, bias), "defining a bias"));
+  return xnnpack_status(
+      xnn_define_convolution_2d(subgraph_.get(), padding, padding, padding, padding, layer.kernel,
+                                layer.kernel, 1, 1, 1, 1, 1, in_channels, layer.out_channels,
+                                layer.relu ? 0.0f : -kInfinity, kInfinity, ids_[layer.inputs[0]],
+                                weights, bias, ids_[i + 1], 0),
+      "convolution");
 }
 
-uint64_t element_count(const ValueShape& shape) { return uint64_t(shape.size) * shape.size * shape.channels; }
+uint64_t element_count(const ValueShape& shape) {
+  return uint64_t(shape.size) * shape.size * shape.channels;
+}
 
 std::vector<bool> find_needed(const Network& network) {
   std::vector<bool> needed(network.layers.size() + 1, false);
@@ -120,8 +140,8 @@ std::vector<bool> find_needed(const Network& network) {
   return needed;
 }
 
-uint64_t estimate_xnnpack_bytes(const Network& network, const std::vector<ValueShape>& shapes, const GraphPlan& plan,
-                                size_t element_bytes) {
+uint64_t estimate_xnnpack_bytes(const Network& network, const std::vector<ValueShape>& shapes,
+                                const GraphPlan& plan, size_t element_bytes) {
   std::vector<size_t> last_use(shapes.size(), 0);
   uint64_t bytes = 0;
   for (size_t i = 0; i < network.layers.size(); ++i) {
@@ -131,7 +151,8 @@ uint64_t estimate_xnnpack_bytes(const Network& network, const std::vector<ValueS
     if (layer.op == LayerOp::kConcat) last_use[layer.inputs[1]] = i;
     const uint64_t pixels = uint64_t(shapes[i + 1].size) * shapes[i + 1].size;
     if (layer.op == LayerOp::kConv2d) {
-      const uint64_t taps = uint64_t{layer.kernel} * layer.kernel * shapes[layer.inputs[0]].channels;
+      const uint64_t taps =
+          uint64_t{layer.kernel} * layer.kernel * shapes[layer.inputs[0]].channels;
       bytes += layer.out_channels * (taps * element_bytes + sizeof(float));
       if (layer.kernel == 3) bytes += pixels * 9 * sizeof(void*);
     }

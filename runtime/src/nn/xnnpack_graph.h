@@ -1,5 +1,6 @@
-// From a figurine::Network to an XNNPACK runtime: the way that float and fixed point share. A derived builder says how a value and a
-// convolution's weights are defined; everything else follows from the layers.
+// From a figurine::Network to an XNNPACK runtime: the way that float and fixed point share. A
+// derived builder says how a value and a convolution's weights are defined; everything else follows
+// from the layers.
 #pragma once
 
 #include <xnnpack.h>
@@ -24,11 +25,13 @@ Status xnnpack_status(xnn_status status, const char* what);
 // Idempotent and thread-safe.
 Status initialize_xnnpack();
 
-// Copies of weights that live until they are packed: packing may read past the end, and a mapped package may end with its page.
+// Copies of weights that live until they are packed: packing may read past the end, and a mapped
+// package may end with its page.
 class PaddedCopies {
  public:
   static size_t padded(size_t size_bytes) {
-    return (size_bytes + XNN_EXTRA_BYTES + kBufferAlignment - 1) / kBufferAlignment * kBufferAlignment;
+    return (size_bytes + XNN_EXTRA_BYTES + kBufferAlignment - 1) / kBufferAlignment *
+           kBufferAlignment;
   }
   // Room for copies whose padded sizes sum to size_bytes.
   bool reserve(size_t size_bytes) { return bytes_.ensure(size_bytes); }
@@ -63,14 +66,15 @@ class GraphBuilder {
       : network_(network), shapes_(shapes), plan_(plan) {}
   virtual ~GraphBuilder() = default;
 
-  // Builds, packs, plans, and points at the fixed buffers of the plan's inputs, then its output. Nothing of the builder is needed
-  // afterwards.
+  // Builds, packs, plans, and points at the fixed buffers of the plan's inputs, then its output.
+  // Nothing of the builder is needed afterwards.
   Status build(std::span<void* const> buffers, ThreadPool& pool, XnnRuntime& runtime);
 
  protected:
   // Room in copies_ for all weights.
   virtual Status reserve_copies() = 0;
-  virtual xnn_status define_value(size_t value, const size_t (&dims)[4], uint32_t external_id, uint32_t flags, uint32_t& id) = 0;
+  virtual xnn_status define_value(size_t value, const size_t (&dims)[4], uint32_t external_id,
+                                  uint32_t flags, uint32_t& id) = 0;
   virtual xnn_status define_weights(size_t layer, const size_t (&dims)[4], uint32_t& id) = 0;
   virtual xnn_status define_bias(size_t layer, const size_t (&dims)[1], uint32_t& id) = 0;
 
@@ -94,8 +98,9 @@ class GraphBuilder {
   std::unique_ptr<xnn_subgraph, SubgraphDeleter> subgraph_;
 };
 
-// What XNNPACK holds for a plan: packed weights, the intermediate values that are alive at the same time, and one pointer per tap and pixel
-// of every 3x3 convolution and resize.
-uint64_t estimate_xnnpack_bytes(const Network& network, const std::vector<ValueShape>& shapes, const GraphPlan& plan, size_t element_bytes);
+// What XNNPACK holds for a plan: packed weights, the intermediate values that are alive at the same
+// time, and one pointer per tap and pixel of every 3x3 convolution and resize.
+uint64_t estimate_xnnpack_bytes(const Network& network, const std::vector<ValueShape>& shapes,
+                                const GraphPlan& plan, size_t element_bytes);
 
 }  // namespace figurine

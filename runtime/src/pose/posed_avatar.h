@@ -1,6 +1,8 @@
-// One avatar, ready to be posed: its network, its person's canonical texels and joints, and the way from a pose to world-space Gaussians.
+// One avatar, ready to be posed: its network, its person's canonical texels and joints, and the way
+// from a pose to world-space Gaussians.
 //
-//   pose -> posed maps of the mean template -> network -> head decoding (canonical Gaussians) -> linear blend skinning -> Gaussians
+//   pose -> posed maps of the mean template -> network -> head decoding (canonical Gaussians) ->
+//   linear blend skinning -> Gaussians
 //
 // Based on: Loper et al., SMPL, 2015 (skinning); the head's parametrisation of figurine/avatar.h.
 #pragma once
@@ -20,29 +22,36 @@
 
 namespace figurine {
 
-// World-space Gaussians, shared by all avatars of a renderer: one is posed and projected before the next.
+// World-space Gaussians, shared by all avatars of a renderer: one is posed and projected before the
+// next.
 struct GaussianArrays {
   Buffer<float> position_m, covariance_factor, opacity, sh;
 
   bool ensure(size_t count, uint32_t sh_degree);
   GaussianView view(uint32_t count, uint32_t sh_degree) const;
   uint64_t memory_bytes() const {
-    return position_m.memory_bytes() + covariance_factor.memory_bytes() + opacity.memory_bytes() + sh.memory_bytes();
+    return position_m.memory_bytes() + covariance_factor.memory_bytes() + opacity.memory_bytes() +
+           sh.memory_bytes();
   }
 };
 
 class PosedAvatar {
  public:
-  // The arrays behind avatar and body are borrowed and must outlive the object. Errors: kUnsupported if the avatar does not hold the
-  // precision; kCorrupt if the network does not fit the maps or the decoding; those of the network's runner; kOutOfMemory.
-  static Result<std::unique_ptr<PosedAvatar>> create(const Avatar& avatar, const Body& body, Precision precision, ThreadPool& pool);
+  // The arrays behind avatar and body are borrowed and must outlive the object. Errors:
+  // kUnsupported if the avatar does not hold the precision; kCorrupt if the network does not fit
+  // the maps or the decoding; those of the network's runner; kOutOfMemory.
+  static Result<std::unique_ptr<PosedAvatar>> create(const Avatar& avatar, const Body& body,
+                                                     Precision precision, ThreadPool& pool);
 
   const Body& body() const { return body_; }
   uint32_t sh_degree() const { return decoding_.sh_degree; }
-  Precision precision() const { return fixed_point_ != nullptr ? Precision::kFixedPoint : Precision::kFloat32; }
+  Precision precision() const {
+    return fixed_point_ != nullptr ? Precision::kFixedPoint : Precision::kFloat32;
+  }
   uint64_t macs() const { return fixed_point_ != nullptr ? fixed_point_->macs() : float_->macs(); }
 
-  // Fills the arrays, which must have room, with one Gaussian per covered texel. The pose must be valid for the body.
+  // Fills the arrays, which must have room, with one Gaussian per covered texel. The pose must be
+  // valid for the body.
   Status pose(const PoseView& pose, GaussianArrays& gaussians, StageClock& clock);
 
   uint64_t memory_bytes() const;

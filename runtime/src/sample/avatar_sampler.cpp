@@ -19,7 +19,9 @@ namespace {
 
 constexpr uint64_t kWeightsStream = 0;  // of a seed's random numbers
 
-Status invalid(const std::string& what) { return Status(StatusCode::kInvalidArgument, "sampling: " + what); }
+Status invalid(const std::string& what) {
+  return Status(StatusCode::kInvalidArgument, "sampling: " + what);
+}
 
 }  // namespace
 
@@ -35,7 +37,8 @@ struct AvatarSampler::Impl {
 
   bool allocate() {
     const size_t size = sampler->direction_scale.size();
-    return z.ensure(size) && x0.ensure(size) && previous_x0.ensure(size) && noisy.ensure(size) && clean.ensure(size);
+    return z.ensure(size) && x0.ensure(size) && previous_x0.ensure(size) && noisy.ensure(size) &&
+           clean.ensure(size);
   }
 
   // The start: standard normal, whatever the mix.
@@ -50,11 +53,13 @@ struct AvatarSampler::Impl {
   }
 
   // Values [D] to an avatar in float and in fixed point.
-  Status decode(std::span<const double> values, std::vector<float>& weights, FixedPointStorage& fixed_point, Avatar& avatar) const {
+  Status decode(std::span<const double> values, std::vector<float>& weights,
+                FixedPointStorage& fixed_point, Avatar& avatar) const {
     weights.resize(sampler->mean.size());
     decode_weights(*sampler, values, weights);
     for (const float weight : weights) {
-      if (!std::isfinite(weight)) return Status(StatusCode::kCorrupt, "sampling: a weight is not finite");
+      if (!std::isfinite(weight))
+        return Status(StatusCode::kCorrupt, "sampling: a weight is not finite");
     }
     avatar.name = sampler->name;
     avatar.body_name = sampler->body_name, avatar.body_hash = sampler->body_hash;
@@ -88,15 +93,22 @@ namespace {
 // The transformer as the solver wants it, and the trace as it wants to be told.
 class Predictor final : public Denoiser<double> {
  public:
-  Predictor(DeviceTransformer& transformer, const NoiseSchedule& schedule, std::span<float> noisy, std::span<float> clean)
-      : transformer_(transformer), noisiest_(schedule.lambda(0)), cleanest_(schedule.lambda(1)), noisy_(noisy), clean_(clean) {}
+  Predictor(DeviceTransformer& transformer, const NoiseSchedule& schedule, std::span<float> noisy,
+            std::span<float> clean)
+      : transformer_(transformer),
+        noisiest_(schedule.lambda(0)),
+        cleanest_(schedule.lambda(1)),
+        noisy_(noisy),
+        clean_(clean) {}
 
   Status traced;  // an error of the trace ends the run at the next prediction
 
-  Status predict(std::span<const double> z, const NoiseLevel& level, size_t, std::span<double> x0) override {
+  Status predict(std::span<const double> z, const NoiseLevel& level, size_t,
+                 std::span<double> x0) override {
     FIG_RETURN_IF_ERROR(traced);
     for (size_t k = 0; k < z.size(); ++k) noisy_[k] = static_cast<float>(z[k]);
-    // Pure noise is told as the noisiest level that was trained: they differ by a D x SNR of a tenth.
+    // Pure noise is told as the noisiest level that was trained: they differ by a D x SNR of a
+    // tenth.
     transformer_.predict(noisy_, std::clamp(level.lambda, noisiest_, cleanest_), clean_);
     for (size_t k = 0; k < z.size(); ++k) x0[k] = double{clean_[k]};
     return {};
@@ -112,7 +124,8 @@ template <class Show>
 class Watcher final : public SolverTrace<double> {
  public:
   explicit Watcher(Show show) : show_(std::move(show)) {}
-  void after_step(size_t step, const NoiseLevel& level, std::span<const double>, std::span<const double> x0) override {
+  void after_step(size_t step, const NoiseLevel& level, std::span<const double>,
+                  std::span<const double> x0) override {
     show_(step, level, x0);
   }
 
@@ -140,29 +153,35 @@ Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& samp
 Status AvatarSampler::sample(const SampleRequest& request, SampledAvatar& out, Trace* trace) {
   Impl& impl = *impl_;
   const uint32_t steps = request.steps == 0 ? impl.sampler->steps : request.steps;
-  if (steps > kMaxSolverSteps) return invalid("steps " + std::to_string(steps) + " are more than " + std::to_string(kMaxSolverSteps));
+  if (steps > kMaxSolverSteps)
+    return invalid("steps " + std::to_string(steps) + " are more than " +
+                   std::to_string(kMaxSolverSteps));
   if (!(request.mix >= 0 && request.mix <= 1)) return invalid("the mix is not within 0 and 1");
   const size_t size = impl.sampler->direction_scale.size();
   impl.levels.resize(size_t{steps} + 1);
   solver_levels(impl.schedule, true, impl.levels);
   impl.fill_start(request);
 
-  Predictor predictor(*impl.transformer, impl.schedule, impl.noisy.span(size), impl.clean.span(size));
+  Predictor predictor(*impl.transformer, impl.schedule, impl.noisy.span(size),
+                      impl.clean.span(size));
   Watcher watcher([&](size_t step, const NoiseLevel& level, std::span<const double> x0) {
     if (trace == nullptr || !predictor.traced.ok()) return;
     predictor.traced = impl.decode(x0, out.weights_, out.fixed_point_, out.avatar_);
-    if (predictor.traced.ok()) predictor.traced = trace->after_step(static_cast<uint32_t>(step) + 1, level.lambda, out);
+    if (predictor.traced.ok())
+      predictor.traced = trace->after_step(static_cast<uint32_t>(step) + 1, level.lambda, out);
   });
   const SolverOptions options{.method = request.method.value_or(impl.sampler->method)};
   const SolverStorage<double> storage{impl.x0.span(size), impl.previous_x0.span(size)};
-  FIG_RETURN_IF_ERROR(solve<double>(options, impl.levels, predictor, storage, impl.z.span(size), trace == nullptr ? nullptr : &watcher));
+  FIG_RETURN_IF_ERROR(solve<double>(options, impl.levels, predictor, storage, impl.z.span(size),
+                                    trace == nullptr ? nullptr : &watcher));
   FIG_RETURN_IF_ERROR(predictor.traced);
   return impl.decode(impl.z.span(size), out.weights_, out.fixed_point_, out.avatar_);
 }
 
 uint64_t AvatarSampler::memory_bytes() const {
-  return impl_->z.memory_bytes() + impl_->x0.memory_bytes() + impl_->previous_x0.memory_bytes() + impl_->noisy.memory_bytes() +
-         impl_->clean.memory_bytes() + impl_->transformer->memory_bytes() + impl_->levels.capacity() * sizeof(NoiseLevel);
+  return impl_->z.memory_bytes() + impl_->x0.memory_bytes() + impl_->previous_x0.memory_bytes() +
+         impl_->noisy.memory_bytes() + impl_->clean.memory_bytes() +
+         impl_->transformer->memory_bytes() + impl_->levels.capacity() * sizeof(NoiseLevel);
 }
 
 uint64_t AvatarSampler::macs_per_evaluation() const {
@@ -172,7 +191,8 @@ uint64_t AvatarSampler::macs_per_evaluation() const {
   const std::vector<MatrixShape> matrices = denoiser_matrices(sampler.denoiser, sampler.ranks);
   const size_t first = sampler.ranks.size() + 2, last = first + size_t{4} * sampler.denoiser.blocks;
   for (size_t i = 0; i < matrices.size(); ++i) {
-    macs += uint64_t{matrices[i].rows} * matrices[i].columns * (i >= first && i < last ? tokens : 1);
+    macs +=
+        uint64_t{matrices[i].rows} * matrices[i].columns * (i >= first && i < last ? tokens : 1);
   }
   return macs + sampler.denoiser.blocks * 2 * tokens * tokens * d;
 }

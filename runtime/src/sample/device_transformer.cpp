@@ -11,20 +11,24 @@ namespace figurine {
 
 namespace {
 
-constexpr double kSlowest = 1.0 / 20, kFastest = 20;  // radians a unit of lambda, as toolchain/generate/transformer.cpp has them
+constexpr double
+    kSlowest = 1.0 / 20,
+    kFastest = 20;  // radians a unit of lambda, as toolchain/generate/transformer.cpp has them
 constexpr double kTurn = 6.283185307179586;
 constexpr double kNormEpsilon = 1e-5;
 constexpr size_t kMatricesOfABlock = 4;
 constexpr float kLog2E = 1.44269504f;
 
-// Sums in double, one after the other: a mean over hundreds of values costs nothing beside a matrix.
+// Sums in double, one after the other: a mean over hundreds of values costs nothing beside a
+// matrix.
 void layer_norm(const float* x, size_t width, const float* weight, const float* bias, float* y) {
   double sum = 0, squares = 0;
   for (size_t k = 0; k < width; ++k) sum += double{x[k]};
   const double mean = sum / static_cast<double>(width);
   for (size_t k = 0; k < width; ++k) squares += (double{x[k]} - mean) * (double{x[k]} - mean);
   const double factor = 1.0 / std::sqrt(squares / static_cast<double>(width) + kNormEpsilon);
-  for (size_t k = 0; k < width; ++k) y[k] = static_cast<float>((double{x[k]} - mean) * factor) * weight[k] + bias[k];
+  for (size_t k = 0; k < width; ++k)
+    y[k] = static_cast<float>((double{x[k]} - mean) * factor) * weight[k] + bias[k];
 }
 
 void gelu(float* x, size_t count) {
@@ -45,12 +49,16 @@ void softmax(float* x, size_t count) {
 }  // namespace
 
 DeviceTransformer::DeviceTransformer(const Sampler& sampler)
-    : sampler_(&sampler), tokens_(sampler.ranks.size() + 1), width_(sampler.denoiser.d_model), padded_tokens_((tokens_ + 7) / 8 * 8) {
+    : sampler_(&sampler),
+      tokens_(sampler.ranks.size() + 1),
+      width_(sampler.denoiser.d_model),
+      padded_tokens_((tokens_ + 7) / 8 * 8) {
   size_t value = 0, row = 0;
   for (const MatrixShape& shape : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
     const size_t size = size_t{shape.rows} * shape.columns;
-    matrices_.push_back(
-        {sampler.matrices.subspan(value, size), sampler.row_scale.subspan(row, shape.rows), sampler.bias.subspan(row, shape.rows)});
+    matrices_.push_back({sampler.matrices.subspan(value, size),
+                         sampler.row_scale.subspan(row, shape.rows),
+                         sampler.bias.subspan(row, shape.rows)});
     value += size, row += shape.rows;
   }
   const size_t half = width_ / 2;
@@ -62,27 +70,33 @@ DeviceTransformer::DeviceTransformer(const Sampler& sampler)
 }
 
 bool DeviceTransformer::allocate() {
-  const size_t feed_forward = sampler_->denoiser.feed_forward, head = width_ / sampler_->denoiser.heads;
+  const size_t feed_forward = sampler_->denoiser.feed_forward,
+               head = width_ / sampler_->denoiser.heads;
   size_t columns = std::max(width_, feed_forward);
   for (const uint32_t rank : sampler_->ranks) columns = std::max<size_t>(columns, rank);
-  return rounded_.ensure(tokens_, columns) && row_.ensure((columns + kDotMultiple - 1) / kDotMultiple * kDotMultiple) &&
+  return rounded_.ensure(tokens_, columns) &&
+         row_.ensure((columns + kDotMultiple - 1) / kDotMultiple * kDotMultiple) &&
          token_.ensure(tokens_ * width_) && normed_.ensure(tokens_ * width_) &&
-         projected_.ensure(tokens_ * std::max(3 * width_, columns)) && attended_.ensure(tokens_ * width_) &&
-         difference_.ensure(tokens_ * width_) && keys_.ensure(head * padded_tokens_) && scores_.ensure(padded_tokens_);
+         projected_.ensure(tokens_ * std::max(3 * width_, columns)) &&
+         attended_.ensure(tokens_ * width_) && difference_.ensure(tokens_ * width_) &&
+         keys_.ensure(head * padded_tokens_) && scores_.ensure(padded_tokens_);
 }
 
 Result<std::unique_ptr<DeviceTransformer>> DeviceTransformer::create(const Sampler& sampler) {
   std::unique_ptr<DeviceTransformer> transformer(new (std::nothrow) DeviceTransformer(sampler));
-  if (transformer == nullptr || !transformer->allocate()) return out_of_memory("the sampler's transformer");
+  if (transformer == nullptr || !transformer->allocate())
+    return out_of_memory("the sampler's transformer");
   return transformer;
 }
 
 uint64_t DeviceTransformer::memory_bytes() const {
-  return rounded_.memory_bytes() + row_.memory_bytes() + token_.memory_bytes() + normed_.memory_bytes() + projected_.memory_bytes() +
-         attended_.memory_bytes() + difference_.memory_bytes() + keys_.memory_bytes() + scores_.memory_bytes();
+  return rounded_.memory_bytes() + row_.memory_bytes() + token_.memory_bytes() +
+         normed_.memory_bytes() + projected_.memory_bytes() + attended_.memory_bytes() +
+         difference_.memory_bytes() + keys_.memory_bytes() + scores_.memory_bytes();
 }
 
-void DeviceTransformer::multiply(const IntegerMatrix& matrix, const float* x, size_t rows, size_t x_stride, float* y, size_t y_stride) {
+void DeviceTransformer::multiply(const IntegerMatrix& matrix, const float* x, size_t rows,
+                                 size_t x_stride, float* y, size_t y_stride) {
   rounded_.round(x, rows, matrix.columns(), x_stride);
   figurine::multiply(matrix, rounded_, row_.span(rounded_.length()), y, y_stride);
 }
@@ -106,11 +120,13 @@ void DeviceTransformer::embed(double lambda) {
 void DeviceTransformer::normalise(size_t which) {
   const float* weight = sampler_->norm.data() + which * 2 * width_;
   for (size_t i = 0; i < tokens_; ++i) {
-    layer_norm(token_.data() + i * width_, width_, weight, weight + width_, normed_.data() + i * width_);
+    layer_norm(token_.data() + i * width_, width_, weight, weight + width_,
+               normed_.data() + i * width_);
   }
 }
 
-// projected_ holds queries, keys and values [tokens,3,heads,d / heads]; attended_ becomes [tokens,d].
+// projected_ holds queries, keys and values [tokens,3,heads,d / heads]; attended_ becomes
+// [tokens,d].
 void DeviceTransformer::attend() {
   const size_t heads = sampler_->denoiser.heads, size = width_ / heads, stride = 3 * width_;
   const auto scale = static_cast<float>(1.0 / std::sqrt(static_cast<double>(size)));

@@ -1,10 +1,13 @@
-// The sampler's transformer on the device: from noisy values to clean ones, the same bits on every CPU.
+// The sampler's transformer on the device: from noisy values to clean ones, the same bits on every
+// CPU.
 //
-// Equations as in toolchain/generate/transformer.h, which trained it: one projection a token, a time token of sinusoids of lambda, pre-norm
-// blocks of attention and feed-forward, one projection back a token. Matrices are exact integer products (integer_linear.h); all else is
-// float in a fixed order with functions of our own (docs/numerics.md, "Sampling on the device").
+// Equations as in toolchain/generate/transformer.h, which trained it: one projection a token, a
+// time token of sinusoids of lambda, pre-norm blocks of attention and feed-forward, one projection
+// back a token. Matrices are exact integer products (integer_linear.h); all else is float in a
+// fixed order with functions of our own (docs/numerics.md, "Sampling on the device").
 //
-// Based on: the paper, section 4.2; Erkoc et al., HyperDiffusion, 2023; Radford et al., GPT-2, 2019 (pre-norm blocks).
+// Based on: the paper, section 4.2; Erkoc et al., HyperDiffusion, 2023; Radford et al., GPT-2, 2019
+// (pre-norm blocks).
 #pragma once
 
 #include <cstddef>
@@ -32,7 +35,8 @@ class DeviceTransformer {
  private:
   explicit DeviceTransformer(const Sampler& sampler);
   bool allocate();
-  void multiply(const IntegerMatrix& matrix, const float* x, size_t rows, size_t x_stride, float* y, size_t y_stride);
+  void multiply(const IntegerMatrix& matrix, const float* x, size_t rows, size_t x_stride, float* y,
+                size_t y_stride);
   void embed(double lambda);
   void normalise(size_t which);
   void attend();

@@ -1,10 +1,11 @@
-// y = W x + b with an int8 matrix and x rounded to int16 where it is used: what a sampler's transformer is made of.
+// y = W x + b with an int8 matrix and x rounded to int16 where it is used: what a sampler's
+// transformer is made of.
 //
-//   x_q = round(x / s), s = max |x| / A of every row of x, A = min(32767, (2^31 - 1) / (127 columns)), rounded down
-//   y_n = float(sum over k of W_nk x_qk) * (row_scale_n * s) + b_n
+//   x_q = round(x / s), s = max |x| / A of every row of x, A = min(32767, (2^31 - 1) / (127
+//   columns)), rounded down y_n = float(sum over k of W_nk x_qk) * (row_scale_n * s) + b_n
 //
-// With this A no int32 sum can overflow, so sums are exact and every CPU has the same bits; int16 keeps the rounding of x (14 bits and
-// more) far below that of W.
+// With this A no int32 sum can overflow, so sums are exact and every CPU has the same bits; int16
+// keeps the rounding of x (14 bits and more) far below that of W.
 #pragma once
 
 #include <cstddef>
@@ -25,12 +26,15 @@ class RoundedRows {
   // Room for the largest product. False without memory.
   bool ensure(size_t rows, size_t columns);
 
-  // x: [rows,columns], rows x_stride apart. A row that is zero throughout stays so; values that are not finite give some integers.
+  // x: [rows,columns], rows x_stride apart. A row that is zero throughout stays so; values that are
+  // not finite give some integers.
   void round(const float* x, size_t rows, size_t columns, size_t x_stride);
 
   size_t rows() const { return rows_; }
   size_t columns() const { return columns_; }
-  size_t length() const { return length_; }  // between rows; a multiple of kDotMultiple, zero behind the columns
+  size_t length() const {
+    return length_;
+  }  // between rows; a multiple of kDotMultiple, zero behind the columns
   const int16_t* row(size_t i) const { return values_.data() + i * length_; }
   float scale(size_t i) const { return scale_[i]; }
   uint64_t memory_bytes() const { return values_.memory_bytes() + scale_.memory_bytes(); }
@@ -50,7 +54,9 @@ struct IntegerMatrix {
   size_t columns() const { return values.size() / rows(); }
 };
 
-// y: [x.rows(),matrix.rows()], rows y_stride apart. x.columns() must be matrix.columns(). row: of x.length() values.
-void multiply(const IntegerMatrix& matrix, const RoundedRows& x, std::span<int16_t> row, float* y, size_t y_stride);
+// y: [x.rows(),matrix.rows()], rows y_stride apart. x.columns() must be matrix.columns(). row: of
+// x.length() values.
+void multiply(const IntegerMatrix& matrix, const RoundedRows& x, std::span<int16_t> row, float* y,
+              size_t y_stride);
 
 }  // namespace figurine

@@ -1,5 +1,5 @@
-// Normal random numbers that are the same to the bit on every CPU, in any order and in any cut: value i depends on (seed, stream, i) alone
-// (figurine/philox.h).
+// Normal random numbers that are the same to the bit on every CPU, in any order and in any cut:
+// value i depends on (seed, stream, i) alone (figurine/philox.h).
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,8 @@
 
 namespace figurine {
 
-// Values first, first + 1, ... of a stream. Allocates nothing; costs about a logarithm, a root, a sine and a cosine for every two values.
+// Values first, first + 1, ... of a stream. Allocates nothing; costs about a logarithm, a root, a
+// sine and a cosine for every two values.
 void fill_normal(uint64_t seed, uint64_t stream, std::span<float> values, uint64_t first = 0);
 
 }  // namespace figurine

@@ -1,5 +1,5 @@
-// Sampled values to the weights of an avatar: w = mean + sum over k of (x_k * scale_k) * q_k, token by token, k rising, every operation
-// rounded in float. The same bits on every CPU.
+// Sampled values to the weights of an avatar: w = mean + sum over k of (x_k * scale_k) * q_k, token
+// by token, k rising, every operation rounded in float. The same bits on every CPU.
 #pragma once
 
 #include <span>

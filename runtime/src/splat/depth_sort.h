@@ -2,7 +2,8 @@
 //
 // All 32 bits of the float count: integer or normalised depths lose neighbours and show as popping.
 //
-// Based on: Knuth, The Art of Computer Programming 3, 5.2.5 (least-significant-digit radix sort); positive floats order as their bits do.
+// Based on: Knuth, The Art of Computer Programming 3, 5.2.5 (least-significant-digit radix sort);
+// positive floats order as their bits do.
 #pragma once
 
 #include <array>
@@ -26,7 +27,9 @@ class DepthSort {
   // The first count items, sorted; valid until the next call.
   const Item* sort(size_t count);
 
-  uint64_t memory_bytes() const { return items_[0].memory_bytes() + items_[1].memory_bytes() + sizeof(histogram_); }
+  uint64_t memory_bytes() const {
+    return items_[0].memory_bytes() + items_[1].memory_bytes() + sizeof(histogram_);
+  }
 
  private:
   static constexpr uint32_t kDigitBits = 11, kDigits = 3, kBuckets = 1u << kDigitBits;

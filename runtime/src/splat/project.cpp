@@ -12,8 +12,10 @@ bool finite(float x) { return x - x == 0; }
 
 float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// Slack of the bounds that only save work: the pixel test decides, these may be too large but never too small.
-constexpr float kReachSlack = 1e-3f;  // in log2 of alpha, a thousand times the rounding of the blend
+// Slack of the bounds that only save work: the pixel test decides, these may be too large but never
+// too small.
+constexpr float kReachSlack =
+    1e-3f;  // in log2 of alpha, a thousand times the rounding of the blend
 constexpr float kBoxSlackPx = 1e-3f;
 constexpr float kBoxSlackRatio = 1.0001f;
 
@@ -24,7 +26,8 @@ ViewParameters make_view_parameters(const Camera& camera, float alpha_cut) {
   view.view_from_world = camera.view_from_world;
   const std::array<float, 12>& m = camera.view_from_world;
   for (int k = 0; k < 3; ++k) {
-    const double centre = -(double(m[k]) * m[3] + double(m[4 + k]) * m[7] + double(m[8 + k]) * m[11]);
+    const double centre =
+        -(double(m[k]) * m[3] + double(m[4 + k]) * m[7] + double(m[8 + k]) * m[11]);
     view.camera_centre_m[k] = static_cast<float>(centre);
   }
   view.fx_px = camera.fx_px;
@@ -34,9 +37,11 @@ ViewParameters make_view_parameters(const Camera& camera, float alpha_cut) {
   view.near_m = camera.near_m;
   view.width_px = camera.width_px;
   view.height_px = camera.height_px;
-  // The image's own range widened by 0.15 of a side on each side: for a centred principal point the original's 1.3 tan(fov / 2).
+  // The image's own range widened by 0.15 of a side on each side: for a centred principal point the
+  // original's 1.3 tan(fov / 2).
   constexpr float kMargin = 0.5f * (kFrustumClamp - 1.0f);
-  const float width = static_cast<float>(camera.width_px), height = static_cast<float>(camera.height_px);
+  const float width = static_cast<float>(camera.width_px),
+              height = static_cast<float>(camera.height_px);
   view.tan_x_min = -(camera.cx_px + kMargin * width) / camera.fx_px;
   view.tan_x_max = (width - camera.cx_px + kMargin * width) / camera.fx_px;
   view.tan_y_min = -(camera.cy_px + kMargin * height) / camera.fy_px;
@@ -45,7 +50,8 @@ ViewParameters make_view_parameters(const Camera& camera, float alpha_cut) {
   return view;
 }
 
-bool evaluate_colour(const float* sh, uint32_t degree, const std::array<float, 3>& direction, float* rgb) {
+bool evaluate_colour(const float* sh, uint32_t degree, const std::array<float, 3>& direction,
+                     float* rgb) {
   std::array<float, sh_coefficients(kMaxShDegree)> basis;
   const float x = direction[0], y = direction[1], z = direction[2];
   basis[0] = kSh0;
@@ -83,8 +89,8 @@ bool evaluate_colour(const float* sh, uint32_t degree, const std::array<float, 3
   return true;
 }
 
-bool project_gaussian(const ViewParameters& view, const GaussianView& gaussians, uint32_t index, kernels::Splat& splat, SplatBox& box,
-                      float& depth_m) {
+bool project_gaussian(const ViewParameters& view, const GaussianView& gaussians, uint32_t index,
+                      kernels::Splat& splat, SplatBox& box, float& depth_m) {
   const float opacity = gaussians.opacity[index];
   if (!(opacity >= view.alpha_cut) || !finite(opacity)) return false;
 
@@ -92,14 +98,16 @@ bool project_gaussian(const ViewParameters& view, const GaussianView& gaussians,
   const float* m = view.view_from_world.data();
   float seen[3];
   for (int i = 0; i < 3; ++i) {
-    seen[i] = (m[4 * i] * position[0] + m[4 * i + 1] * position[1]) + (m[4 * i + 2] * position[2] + m[4 * i + 3]);
+    seen[i] = (m[4 * i] * position[0] + m[4 * i + 1] * position[1]) +
+              (m[4 * i + 2] * position[2] + m[4 * i + 3]);
   }
   const float z = seen[2];
   if (!(z > view.near_m)) return false;  // written so that NaN is culled too
   const float tan_x = seen[0] / z, tan_y = seen[1] / z;
   const float mean_x = view.fx_px * tan_x + view.cx_px, mean_y = view.fy_px * tan_y + view.cy_px;
 
-  // Rows u, v of the projected factor J R F; the 2D covariance is their Gram matrix plus the dilation.
+  // Rows u, v of the projected factor J R F; the 2D covariance is their Gram matrix plus the
+  // dilation.
   const float clamped_x = std::min(std::max(tan_x, view.tan_x_min), view.tan_x_max);
   const float clamped_y = std::min(std::max(tan_y, view.tan_y_min), view.tan_y_max);
   const float focal_x = view.fx_px / z, focal_y = view.fy_px / z;
@@ -114,23 +122,31 @@ bool project_gaussian(const ViewParameters& view, const GaussianView& gaussians,
   }
   const float uu = dot(u, u), vv = dot(v, v);
   const float a = uu + kDilationPx2, b = dot(u, v), c = vv + kDilationPx2;
-  // a c - b^2 would cancel for needles. By Cauchy-Binet it is the sum of the squared 2x2 minors of [u; v] and of the dilation's terms: all
-  // positive.
-  const float minors[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-  const float determinant = dot(minors, minors) + kDilationPx2 * (uu + vv) + kDilationPx2 * kDilationPx2;
-  if (!finite(mean_x) || !finite(mean_y) || !finite(a) || !finite(b) || !finite(c) || !finite(determinant)) return false;
+  // a c - b^2 would cancel for needles. By Cauchy-Binet it is the sum of the squared 2x2 minors of
+  // [u; v] and of the dilation's terms: all positive.
+  const float minors[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                           u[0] * v[1] - u[1] * v[0]};
+  const float determinant =
+      dot(minors, minors) + kDilationPx2 * (uu + vv) + kDilationPx2 * kDilationPx2;
+  if (!finite(mean_x) || !finite(mean_y) || !finite(a) || !finite(b) || !finite(c) ||
+      !finite(determinant))
+    return false;
 
   // Where alpha can reach the cut. reach = log2(opacity / cut); 2 ln(opacity / cut) = 2 ln 2 reach.
   constexpr float kTwoLn2 = 1.38629436f;
   const float reach = log2_float(opacity / view.alpha_cut) + kReachSlack;
   const float radius =
-      std::sqrt(kTwoLn2 * reach) * kBoxSlackRatio;  // in standard deviations; apart from a and c, so that nothing overflows
+      std::sqrt(kTwoLn2 * reach) *
+      kBoxSlackRatio;  // in standard deviations; apart from a and c, so that nothing overflows
   const float half_width = radius * std::sqrt(a) + kBoxSlackPx;
   const float half_height = radius * std::sqrt(c) + kBoxSlackPx;
-  const float width = static_cast<float>(view.width_px), height = static_cast<float>(view.height_px);
+  const float width = static_cast<float>(view.width_px),
+              height = static_cast<float>(view.height_px);
   // Pixel centres lie between 0.5 and size - 0.5.
-  const float left = mean_x - half_width, right = mean_x + half_width, top = mean_y - half_height, bottom = mean_y + half_height;
-  if (!(left <= width - 0.5f && right >= 0.5f && top <= height - 0.5f && bottom >= 0.5f)) return false;
+  const float left = mean_x - half_width, right = mean_x + half_width, top = mean_y - half_height,
+              bottom = mean_y + half_height;
+  if (!(left <= width - 0.5f && right >= 0.5f && top <= height - 0.5f && bottom >= 0.5f))
+    return false;
 
   std::array<float, 3> direction;
   for (int k = 0; k < 3; ++k) direction[k] = position[k] - view.camera_centre_m[k];
@@ -138,7 +154,8 @@ bool project_gaussian(const ViewParameters& view, const GaussianView& gaussians,
   for (float& component : direction) component *= inverse_length;
   float rgb[3];
   const size_t sh_stride = size_t(3) * sh_coefficients(gaussians.sh_degree);
-  if (!evaluate_colour(&gaussians.sh[index * sh_stride], gaussians.sh_degree, direction, rgb)) return false;
+  if (!evaluate_colour(&gaussians.sh[index * sh_stride], gaussians.sh_degree, direction, rgb))
+    return false;
 
   constexpr float kLog2E = 1.44269504f;
   const float scale_u = std::sqrt(c / determinant * (0.5f * kLog2E));

@@ -1,10 +1,13 @@
-// Any number of Gaussian sets into one image: project, sort by depth, bin into tiles, blend, resolve.
+// Any number of Gaussian sets into one image: project, sort by depth, bin into tiles, blend,
+// resolve.
 //
-// Memory is bounded by the number of Gaussians and tiles alone. The (splat, tile) pairs are not: a frame whose pairs do not fit the list is
-// drawn in bands of tiles, each of which does. So a frame never allocates after begin(), and never fails after it.
+// Memory is bounded by the number of Gaussians and tiles alone. The (splat, tile) pairs are not: a
+// frame whose pairs do not fit the list is drawn in bands of tiles, each of which does. So a frame
+// never allocates after begin(), and never fails after it.
 //
-// Based on: Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023 (tiles, front-to-back blending); here one
-// global depth sort and a stable counting bin take the place of sorting (tile, depth) pairs, and ellipses are bounded exactly.
+// Based on: Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023
+// (tiles, front-to-back blending); here one global depth sort and a stable counting bin take the
+// place of sorting (tile, depth) pairs, and ellipses are bounded exactly.
 #pragma once
 
 #include <array>
@@ -27,15 +30,17 @@ class Rasterizer {
  public:
   explicit Rasterizer(ThreadPool& pool) : pool_(pool) {}
 
-  // Starts a frame of at most gaussian_count Gaussians. The camera must be valid, alpha_cut in (0, 0.5]. Error: kOutOfMemory.
+  // Starts a frame of at most gaussian_count Gaussians. The camera must be valid, alpha_cut in (0,
+  // 0.5]. Error: kOutOfMemory.
   Status begin(const Camera& camera, float alpha_cut, uint32_t gaussian_count);
 
-  // Projects a set behind those already added. Sets count in the order they are added where depths are equal. The set is not needed
-  // afterwards.
+  // Projects a set behind those already added. Sets count in the order they are added where depths
+  // are equal. The set is not needed afterwards.
   void add(const GaussianView& gaussians, StageClock& clock);
 
   // Sorts, bins, blends and writes every pixel of the target, which must be valid for the camera.
-  void draw(const ImageTarget& target, const std::optional<std::array<float, 3>>& background, StageClock& clock);
+  void draw(const ImageTarget& target, const std::optional<std::array<float, 3>>& background,
+            StageClock& clock);
 
   uint64_t gaussians() const { return added_; }
   uint64_t visible() const { return visible_; }
@@ -48,10 +53,12 @@ class Rasterizer {
     uint32_t begin, end;
   };
 
-  uint32_t project_chunk(const GaussianView& gaussians, uint32_t begin, uint32_t end, uint32_t first_slot);
+  uint32_t project_chunk(const GaussianView& gaussians, uint32_t begin, uint32_t end,
+                         uint32_t first_slot);
   void count_pairs();
   void fill_pairs(const TileRange& band);
-  void blend_tile(uint32_t tile, const ImageTarget& target, const std::optional<std::array<float, 3>>& background, StageClock& clock);
+  void blend_tile(uint32_t tile, const ImageTarget& target,
+                  const std::optional<std::array<float, 3>>& background, StageClock& clock);
   template <class Visit>
   void for_each_tile(uint32_t slot, const Visit& visit) const;
 

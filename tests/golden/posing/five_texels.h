@@ -33,7 +33,8 @@ std::vector<T> flatten(const Json& value) {
 struct FiveTexels {
   Json document, expected;
   std::vector<int16_t> parents;
-  std::vector<float> joints, joint_basis, positions, normals, weights, spacing, basis, rotations, shape, network_weights, network_bias;
+  std::vector<float> joints, joint_basis, positions, normals, weights, spacing, basis, rotations,
+      shape, network_weights, network_bias;
   std::vector<uint32_t> texel, border_texel, border_source;
   std::vector<uint8_t> texel_joints;
   Body body;
@@ -47,7 +48,8 @@ struct FiveTexels {
   FiveTexels() {
     std::ifstream(FIGURINE_SOURCE_DIR "/tests/golden/posing/five_texels.json") >> document;
     expected = document["expected"];
-    const Json &b = document["body"], &a = document["avatar"], &p = document["pose"], &c = document["camera"];
+    const Json &b = document["body"], &a = document["avatar"], &p = document["pose"],
+               &c = document["camera"];
     parents = flatten<int16_t>(b["parents"]);
     joints = flatten<float>(b["joint_position_m"]);
     joint_basis = flatten<float>(b["joint_shape_basis_m"]);
@@ -77,7 +79,8 @@ struct FiveTexels {
             .border_source = border_source};
     rotations = flatten<float>(p["rotations"]);
     pose = {p["root_translation_m"].get<std::array<float, 3>>(), rotations};
-    statistics = {a["map_mean"].get<std::array<float, 6>>(), a["map_scale"].get<std::array<float, 6>>()};
+    statistics = {a["map_mean"].get<std::array<float, 6>>(),
+                  a["map_scale"].get<std::array<float, 6>>()};
     decoding = {.offset_scale_m = a["offset_scale_m"],
                 .spacing_scale = a["spacing_scale"],
                 .max_log_scale = a["max_log_scale"],

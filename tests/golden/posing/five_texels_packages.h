@@ -16,7 +16,8 @@ inline Provenance five_texels_provenance() {
 }
 
 // Describes the example's avatar: a network of one 1x1 convolution. Spans point into example.
-inline Avatar five_texels_avatar(const FiveTexels& example, const std::array<uint64_t, 2>& body_hash) {
+inline Avatar five_texels_avatar(const FiveTexels& example,
+                                 const std::array<uint64_t, 2>& body_hash) {
   Avatar avatar;
   avatar.name = "five texels";
   avatar.body_name = example.body.name;
@@ -46,15 +47,20 @@ inline Avatar five_texels_avatar(const FiveTexels& example, const std::array<uin
 class FiveTexelsPackages {
  public:
   explicit FiveTexelsPackages(const FiveTexels& example) {
-    const Result<std::vector<std::byte>> body = write_package(example.body, five_texels_provenance());
+    const Result<std::vector<std::byte>> body =
+        write_package(example.body, five_texels_provenance());
     body_bytes_ = tests::AlignedBytes(body.value());
-    body_ = std::make_unique<Package>(Package::open(body_bytes_.bytes(), "five texels' body").value());
+    body_ =
+        std::make_unique<Package>(Package::open(body_bytes_.bytes(), "five texels' body").value());
     const Avatar avatar = five_texels_avatar(example, body_->content_hash());
-    const Budget budget{
-        .peak_memory_bytes = 1 << 20, .macs_per_frame = 16 * 10 * head_channels(0), .gaussians = example.body.texel_count()};
-    const Result<std::vector<std::byte>> written = write_package(avatar, budget, five_texels_provenance());
+    const Budget budget{.peak_memory_bytes = 1 << 20,
+                        .macs_per_frame = 16 * 10 * head_channels(0),
+                        .gaussians = example.body.texel_count()};
+    const Result<std::vector<std::byte>> written =
+        write_package(avatar, budget, five_texels_provenance());
     avatar_bytes_ = tests::AlignedBytes(written.value());
-    avatar_ = std::make_unique<Package>(Package::open(avatar_bytes_.bytes(), "five texels' avatar").value());
+    avatar_ = std::make_unique<Package>(
+        Package::open(avatar_bytes_.bytes(), "five texels' avatar").value());
   }
   const Package& body() const { return *body_; }
   const Package& avatar() const { return *avatar_; }

@@ -12,16 +12,19 @@
 namespace figurine::body::test {
 
 struct GlbBuilder {
-  nlohmann::json json = {
-      {"asset", {{"version", "2.0"}}},
-      {"nodes", nlohmann::json::array()},
-      {"accessors", nlohmann::json::array()},
-      {"bufferViews", nlohmann::json::array()},
-      {"animations", {{{"name", "made"}, {"channels", nlohmann::json::array()}, {"samplers", nlohmann::json::array()}}}}};
+  nlohmann::json json = {{"asset", {{"version", "2.0"}}},
+                         {"nodes", nlohmann::json::array()},
+                         {"accessors", nlohmann::json::array()},
+                         {"bufferViews", nlohmann::json::array()},
+                         {"animations",
+                          {{{"name", "made"},
+                            {"channels", nlohmann::json::array()},
+                            {"samplers", nlohmann::json::array()}}}}};
   std::string bin;
 
   // Returns the node's index. parent -1: a root.
-  int node(const std::string& name, int parent, const nlohmann::json& transform = nlohmann::json::object()) {
+  int node(const std::string& name, int parent,
+           const nlohmann::json& transform = nlohmann::json::object()) {
     const int index = static_cast<int>(json["nodes"].size());
     json["nodes"].push_back(transform);
     json["nodes"].back()["name"] = name;
@@ -30,9 +33,11 @@ struct GlbBuilder {
   }
 
   template <class T>
-  int accessor(const std::vector<T>& values, int component_type, const std::string& type, size_t width) {
+  int accessor(const std::vector<T>& values, int component_type, const std::string& type,
+               size_t width) {
     while (bin.size() % 4 != 0) bin += '\0';
-    json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", bin.size()}, {"byteLength", values.size() * sizeof(T)}});
+    json["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", bin.size()}, {"byteLength", values.size() * sizeof(T)}});
     bin.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
     json["accessors"].push_back({{"bufferView", json["bufferViews"].size() - 1},
                                  {"componentType", component_type},
@@ -42,17 +47,21 @@ struct GlbBuilder {
     return static_cast<int>(json["accessors"].size()) - 1;
   }
 
-  void channel(int node_index, const std::string& path, const std::string& interpolation, int input, int output) {
+  void channel(int node_index, const std::string& path, const std::string& interpolation, int input,
+               int output) {
     nlohmann::json& animation = json["animations"][0];
-    animation["channels"].push_back({{"sampler", animation["samplers"].size()}, {"target", {{"node", node_index}, {"path", path}}}});
-    animation["samplers"].push_back({{"input", input}, {"output", output}, {"interpolation", interpolation}});
+    animation["channels"].push_back({{"sampler", animation["samplers"].size()},
+                                     {"target", {{"node", node_index}, {"path", path}}}});
+    animation["samplers"].push_back(
+        {{"input", input}, {"output", output}, {"interpolation", interpolation}});
   }
 
-  void track(int node_index, const std::string& path, const std::string& interpolation, const std::vector<float>& times,
-             const std::vector<float>& values) {
+  void track(int node_index, const std::string& path, const std::string& interpolation,
+             const std::vector<float>& times, const std::vector<float>& values) {
     const size_t width = path == "rotation" ? 4 : 3;
     const int input = accessor(times, 5126, "SCALAR", 1);
-    channel(node_index, path, interpolation, input, accessor(values, 5126, width == 4 ? "VEC4" : "VEC3", width));
+    channel(node_index, path, interpolation, input,
+            accessor(values, 5126, width == 4 ? "VEC4" : "VEC3", width));
   }
 
   static std::string word(uint32_t value) { return {reinterpret_cast<const char*>(&value), 4}; }
@@ -61,7 +70,8 @@ struct GlbBuilder {
     while (text.size() % 4 != 0) text += ' ';
     while (binary.size() % 4 != 0) binary += '\0';
     const size_t size = 12 + 8 + text.size() + 8 + binary.size();
-    return "glTF" + word(2) + word(static_cast<uint32_t>(size)) + word(static_cast<uint32_t>(text.size())) + "JSON" + text +
+    return "glTF" + word(2) + word(static_cast<uint32_t>(size)) +
+           word(static_cast<uint32_t>(text.size())) + "JSON" + text +
            word(static_cast<uint32_t>(binary.size())) + std::string("BIN\0", 4) + binary;
   }
 
@@ -72,6 +82,8 @@ struct GlbBuilder {
   }
 };
 
-inline std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+inline std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
 
 }  // namespace figurine::body::test

@@ -1,4 +1,5 @@
-// The glTF reader on small files, sound and hostile: every interpolation and number format against values computed by hand.
+// The glTF reader on small files, sound and hostile: every interpolation and number format against
+// values computed by hand.
 #include "toolchain/body/gltf.h"
 
 #include <cmath>
@@ -19,11 +20,16 @@ using Vec3 = Eigen::Vector3d;
 
 constexpr float kHalf = 0.70710678f;  // sine and cosine of 45 degrees: half of a right angle
 
-Gltf parse(const std::string& file, uint32_t animation = 0) { return parse_glb(test::bytes_of(file), "a.glb", animation); }
+Gltf parse(const std::string& file, uint32_t animation = 0) {
+  return parse_glb(test::bytes_of(file), "a.glb", animation);
+}
 
-Quat about_z(double degrees) { return Quat(Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vec3::UnitZ())); }
+Quat about_z(double degrees) {
+  return Quat(Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vec3::UnitZ()));
+}
 
-// A node that turns from 0 to 90 degrees about z within times 1 and 3, and a second one for its places.
+// A node that turns from 0 to 90 degrees about z within times 1 and 3, and a second one for its
+// places.
 GlbBuilder sound() {
   GlbBuilder glb;
   const int root = glb.node("root", -1, {{"translation", {1, 2, 3}}});
@@ -55,7 +61,8 @@ TEST(Gltf, ReadsNodesAndInterpolatesLinearly) {
 TEST(Gltf, RotatesTheShorterWay) {
   GlbBuilder glb;
   glb.node("root", -1);
-  glb.track(0, "rotation", "LINEAR", {0, 1}, {0, 0, 0, 1, 0, 0, -kHalf, -kHalf});  // the same 90 degrees, other sign
+  glb.track(0, "rotation", "LINEAR", {0, 1},
+            {0, 0, 0, 1, 0, 0, -kHalf, -kHalf});  // the same 90 degrees, other sign
   EXPECT_LT(parse(glb.file()).at(0.5)[0].rotation.angularDistance(about_z(45)), 1e-6);
 }
 
@@ -77,9 +84,12 @@ TEST(Gltf, CubicSplinesAreHermite) {
   GlbBuilder glb;
   glb.node("root", -1);
   // x(t) = (t - 1)^3 on [1, 3]: slopes 0 and 12, values 0 and 8. A Hermite cubic is that cubic.
-  glb.track(0, "translation", "CUBICSPLINE", {1, 3}, {9, 9, 9, 0, 0, 0, 0, 0, 0, 12, 0, 0, 8, 0, 0, 9, 9, 9});
-  // Without tangents: smooth steps between the quaternions, then normalised. Half way: the mean of 0 and 90 degrees.
-  glb.track(0, "rotation", "CUBICSPLINE", {1, 3}, {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, kHalf, kHalf, 0, 0, 0, 0});
+  glb.track(0, "translation", "CUBICSPLINE", {1, 3},
+            {9, 9, 9, 0, 0, 0, 0, 0, 0, 12, 0, 0, 8, 0, 0, 9, 9, 9});
+  // Without tangents: smooth steps between the quaternions, then normalised. Half way: the mean of
+  // 0 and 90 degrees.
+  glb.track(0, "rotation", "CUBICSPLINE", {1, 3},
+            {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, kHalf, kHalf, 0, 0, 0, 0});
   const Gltf gltf = parse(glb.file());
   for (double t : {0.0, 1.0, 1.25, 2.0, 2.9, 3.0, 7.0}) {
     const double x = std::pow(std::clamp(t, 1.0, 3.0) - 1, 3);
@@ -97,7 +107,8 @@ void expect_normalised(int component_type, std::vector<T> stored, const Quat& wa
   glb.node("root", -1);
   const int input = glb.accessor<float>({0}, 5126, "SCALAR", 1);
   glb.channel(0, "rotation", "LINEAR", input, glb.accessor<T>(stored, component_type, "VEC4", 4));
-  EXPECT_LT(parse(glb.file()).at(0)[0].rotation.angularDistance(wanted.normalized()), 1e-6) << component_type;
+  EXPECT_LT(parse(glb.file()).at(0)[0].rotation.angularDistance(wanted.normalized()), 1e-6)
+      << component_type;
 }
 
 TEST(Gltf, NormalisedIntegersOfEveryWidth) {
@@ -133,7 +144,8 @@ TEST(Gltf, AMatrixIsTakenApart) {
 
 TEST(Gltf, ParentsComeFirstWhateverTheOrderOfTheFile) {
   GlbBuilder glb = sound();
-  glb.json["nodes"] = {{{"name", "a"}}, {{"name", "b"}, {"children", {0}}}, {{"name", "c"}, {"children", {1}}}};
+  glb.json["nodes"] = {
+      {{"name", "a"}}, {{"name", "b"}, {"children", {0}}}, {{"name", "c"}, {"children", {1}}}};
   const Gltf gltf = parse(glb.file());
   EXPECT_EQ(gltf.order, (std::vector<uint32_t>{2, 1, 0}));
   EXPECT_EQ(gltf.nodes[0].parent, 1);
@@ -145,12 +157,14 @@ TEST(Gltf, OneOfSeveralAnimations) {
   second["channels"].erase(0);
   glb.json["animations"].push_back(second);
   EXPECT_EQ(parse(glb.file(), 1).tracks.size(), 1u);
-  EXPECT_EQ(test::input_error([&] { parse(glb.file(), 2); }), "a.glb: animations: no number 2: there are 2");
+  EXPECT_EQ(test::input_error([&] { parse(glb.file(), 2); }),
+            "a.glb: animations: no number 2: there are 2");
 }
 
 TEST(Gltf, EveryPrefixAndEveryLongerFileIsRefused) {
   const std::string file = sound().file();
-  for (size_t length = 0; length < file.size(); ++length) EXPECT_THROW(parse(file.substr(0, length)), InputError) << length;
+  for (size_t length = 0; length < file.size(); ++length)
+    EXPECT_THROW(parse(file.substr(0, length)), InputError) << length;
   EXPECT_THROW(parse(file + std::string(4, '\0')), InputError);
 }
 
@@ -191,101 +205,158 @@ TEST(Gltf, NamesFieldAndReason) {
   };
   EXPECT_EQ(header(0, 0), "a.glb: header: magic: not a binary glTF file");
   EXPECT_EQ(header(4, 1), "a.glb: header: version 1: only 2 is read");
-  EXPECT_NE(header(8, 4000).find("a.glb: header: length: 4000 bytes, the file has "), std::string::npos);
-  EXPECT_NE(header(12, 0xfffffffc).find("a.glb: chunk 0: length: 4294967292 bytes, "), std::string::npos);
+  EXPECT_NE(header(8, 4000).find("a.glb: header: length: 4000 bytes, the file has "),
+            std::string::npos);
+  EXPECT_NE(header(12, 0xfffffffc).find("a.glb: chunk 0: length: 4294967292 bytes, "),
+            std::string::npos);
   EXPECT_NE(header(16, 0).find("a.glb: chunk 0: type: "), std::string::npos);
-  EXPECT_NE(test::input_error([&] { parse(GlbBuilder::file("{\"a\":", "")); }).find("a.glb: JSON: not valid at byte "), std::string::npos);
-  EXPECT_EQ(test::input_error([&] { parse(GlbBuilder::file("{\"a\":1e999}", "")); }), "a.glb: JSON: a number is out of range");
-  EXPECT_EQ(test::input_error([&] { parse(GlbBuilder::file("[]", "")); }), "a.glb: JSON: not an object");
+  EXPECT_NE(test::input_error([&] {
+              parse(GlbBuilder::file("{\"a\":", ""));
+            }).find("a.glb: JSON: not valid at byte "),
+            std::string::npos);
+  EXPECT_EQ(test::input_error([&] { parse(GlbBuilder::file("{\"a\":1e999}", "")); }),
+            "a.glb: JSON: a number is out of range");
+  EXPECT_EQ(test::input_error([&] { parse(GlbBuilder::file("[]", "")); }),
+            "a.glb: JSON: not an object");
   EXPECT_EQ(test::input_error([&] { parse(GlbBuilder::file("{}", "")); }), "a.glb: asset: missing");
 
-  const auto sampler = [](GlbBuilder& glb) -> nlohmann::json& { return glb.json["animations"][0]["samplers"][0]; };
-  const auto target = [](GlbBuilder& glb) -> nlohmann::json& { return glb.json["animations"][0]["channels"][0]["target"]; };
+  const auto sampler = [](GlbBuilder& glb) -> nlohmann::json& {
+    return glb.json["animations"][0]["samplers"][0];
+  };
+  const auto target = [](GlbBuilder& glb) -> nlohmann::json& {
+    return glb.json["animations"][0]["channels"][0]["target"];
+  };
   const std::vector<std::pair<std::function<void(GlbBuilder&)>, std::string>> cases = {
-      {[](auto& g) { g.json["asset"]["version"] = "1.0"; }, "asset.version: \"1.0\": only 2.0 is read"},
+      {[](auto& g) { g.json["asset"]["version"] = "1.0"; },
+       "asset.version: \"1.0\": only 2.0 is read"},
       {[](auto& g) { g.json.erase("nodes"); }, "nodes: missing"},
       {[](auto& g) { g.json["nodes"] = 5; }, "nodes: not an array"},
       {[](auto& g) { g.json["nodes"][0] = 5; }, "nodes[0]: not an object"},
       {[](auto& g) { g.json["nodes"][0]["name"] = 5; }, "nodes[0].name: not a string"},
-      {[](auto& g) { g.json["nodes"][0]["children"][0] = 7; }, "nodes[0].children[0]: 7: there are only 2 nodes"},
-      {[](auto& g) { g.json["nodes"][0]["children"][0] = -1; }, "nodes[0].children[0]: not a count"},
-      {[](auto& g) { g.json["nodes"][0]["children"] = {1, 1}; }, "nodes[0].children[1]: node 1 has two parents"},
+      {[](auto& g) { g.json["nodes"][0]["children"][0] = 7; },
+       "nodes[0].children[0]: 7: there are only 2 nodes"},
+      {[](auto& g) { g.json["nodes"][0]["children"][0] = -1; },
+       "nodes[0].children[0]: not a count"},
+      {[](auto& g) { g.json["nodes"][0]["children"] = {1, 1}; },
+       "nodes[0].children[1]: node 1 has two parents"},
       {[](auto& g) { g.json["nodes"][1]["children"] = {0}; }, "nodes: children go in a circle"},
-      {[](auto& g) { g.json["nodes"][0]["translation"] = {1, 2}; }, "nodes[0].translation: 2 numbers, expected 3"},
-      {[](auto& g) { g.json["nodes"][0]["translation"] = {1, "x", 2}; }, "nodes[0].translation[1]: not a number"},
-      {[](auto& g) { g.json["nodes"][0]["translation"] = {1, 1e30, 2}; }, "nodes[0].translation[1]: not finite or out of range"},
-      {[](auto& g) { g.json["nodes"][0]["rotation"] = {0, 0, 0, 0}; }, "nodes[0].rotation: a quaternion of no length"},
+      {[](auto& g) { g.json["nodes"][0]["translation"] = {1, 2}; },
+       "nodes[0].translation: 2 numbers, expected 3"},
+      {[](auto& g) { g.json["nodes"][0]["translation"] = {1, "x", 2}; },
+       "nodes[0].translation[1]: not a number"},
+      {[](auto& g) { g.json["nodes"][0]["translation"] = {1, 1e30, 2}; },
+       "nodes[0].translation[1]: not finite or out of range"},
+      {[](auto& g) { g.json["nodes"][0]["rotation"] = {0, 0, 0, 0}; },
+       "nodes[0].rotation: a quaternion of no length"},
       {[](auto& g) { g.json["nodes"][0]["scale"] = {1, -1, 1}; }, "nodes[0].scale: mirrored"},
-      {[](auto& g) { g.json["nodes"][1]["matrix"] = {1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; }, "nodes[1].matrix: sheared"},
-      {[](auto& g) { g.json["nodes"][1]["matrix"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1}; }, "nodes[1].matrix: mirrored"},
-      {[](auto& g) { g.json["nodes"][1]["matrix"] = {0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; },
+      {[](auto& g) {
+         g.json["nodes"][1]["matrix"] = {1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+       },
+       "nodes[1].matrix: sheared"},
+      {[](auto& g) {
+         g.json["nodes"][1]["matrix"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
+       },
+       "nodes[1].matrix: mirrored"},
+      {[](auto& g) {
+         g.json["nodes"][1]["matrix"] = {0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+       },
        "nodes[1].matrix: an axis of no length"},
       {[](auto& g) { g.json.erase("animations"); }, "animations: there are none"},
-      {[](auto& g) { g.json["animations"] = nlohmann::json::array(); }, "animations: there are none"},
+      {[](auto& g) { g.json["animations"] = nlohmann::json::array(); },
+       "animations: there are none"},
       {[](auto& g) { g.json["animations"] = "all"; }, "animations: not an array"},
-      {[&](auto& g) { target(g)["node"] = 9; }, "animations[0].channels[0].target.node: 9: there are only 2 nodes"},
+      {[&](auto& g) { target(g)["node"] = 9; },
+       "animations[0].channels[0].target.node: 9: there are only 2 nodes"},
       {[&](auto& g) { target(g)["path"] = "spin"; },
-       "animations[0].channels[0].target.path: \"spin\" is none of translation, rotation, scale and weights"},
-      {[&](auto& g) { g.json["animations"][0]["channels"].push_back(g.json["animations"][0]["channels"][0]); },
+       "animations[0].channels[0].target.path: \"spin\" is none of translation, rotation, scale "
+       "and weights"},
+      {[&](auto& g) {
+         g.json["animations"][0]["channels"].push_back(g.json["animations"][0]["channels"][0]);
+       },
        "animations[0].channels[2].target: a second channel for the same node and path"},
       {[&](auto& g) { g.json["animations"][0]["channels"][0]["sampler"] = 9; },
        "animations[0].channels[0].sampler: 9: there are only 2 animations[0].samplers"},
       {[&](auto& g) { sampler(g)["interpolation"] = "FAST"; },
        "animations[0].samplers[0].interpolation: \"FAST\" is none of STEP, LINEAR and CUBICSPLINE"},
       {[&](auto& g) { sampler(g).erase("input"); }, "animations[0].samplers[0].input: missing"},
-      {[&](auto& g) { sampler(g)["input"] = 44; }, "animations[0].samplers[0].input: 44: there are only 4 accessors"},
+      {[&](auto& g) { sampler(g)["input"] = 44; },
+       "animations[0].samplers[0].input: 44: there are only 4 accessors"},
       {[&](auto& g) { sampler(g)["output"] = 0; }, "accessors[0].type: \"SCALAR\", expected VEC4"},
-      {[&](auto& g) { sampler(g)["interpolation"] = "CUBICSPLINE"; }, "animations[0].samplers[0].output: 2 values for 2 keys"},
+      {[&](auto& g) { sampler(g)["interpolation"] = "CUBICSPLINE"; },
+       "animations[0].samplers[0].output: 2 values for 2 keys"},
       {[](auto& g) { g.json["accessors"][1]["componentType"] = 5125; },
        "accessors[1].componentType: 5125: not one that these keys may have"},
       {[](auto& g) { g.json["accessors"][0]["componentType"] = 5123; },
        "accessors[0].componentType: 5123: not one that these keys may have"},
-      {[](auto& g) { g.json["accessors"][1]["componentType"] = 5122; }, "accessors[1]: integers that are not normalized"},
-      {[](auto& g) { g.json["accessors"][1]["sparse"] = 1; }, "accessors[1].sparse: unsupported: sparse keys are not read"},
-      {[](auto& g) { g.json["accessors"][1].erase("bufferView"); }, "accessors[1].bufferView: missing"},
+      {[](auto& g) { g.json["accessors"][1]["componentType"] = 5122; },
+       "accessors[1]: integers that are not normalized"},
+      {[](auto& g) { g.json["accessors"][1]["sparse"] = 1; },
+       "accessors[1].sparse: unsupported: sparse keys are not read"},
+      {[](auto& g) { g.json["accessors"][1].erase("bufferView"); },
+       "accessors[1].bufferView: missing"},
       {[](auto& g) { g.json["accessors"][1]["count"] = 0; }, "accessors[1].count: no elements"},
-      {[](auto& g) { g.json["accessors"][1]["count"] = 3; }, "accessors[1]: reaches past the end of its buffer view of 32 bytes"},
+      {[](auto& g) { g.json["accessors"][1]["count"] = 3; },
+       "accessors[1]: reaches past the end of its buffer view of 32 bytes"},
       {[](auto& g) { g.json["accessors"][1]["count"] = std::numeric_limits<uint64_t>::max(); },
        "accessors[1]: reaches past the end of its buffer view of 32 bytes"},
       {[](auto& g) { g.json["accessors"][1]["count"] = 2.5; }, "accessors[1].count: not a count"},
       {[](auto& g) { g.json["accessors"][1]["byteOffset"] = std::numeric_limits<uint64_t>::max(); },
        "accessors[1]: reaches past the end of its buffer view of 32 bytes"},
-      {[](auto& g) { g.json["bufferViews"][1]["byteStride"] = 8; }, "bufferViews[1].byteStride: 8: not within the element's size and 252"},
-      {[](auto& g) { g.json["bufferViews"][1]["byteLength"] = 4000; }, "bufferViews[1]: reaches past the end of its buffer of "},
-      {[](auto& g) { g.json["bufferViews"][1]["byteOffset"] = std::numeric_limits<uint64_t>::max(); },
+      {[](auto& g) { g.json["bufferViews"][1]["byteStride"] = 8; },
+       "bufferViews[1].byteStride: 8: not within the element's size and 252"},
+      {[](auto& g) { g.json["bufferViews"][1]["byteLength"] = 4000; },
+       "bufferViews[1]: reaches past the end of its buffer of "},
+      {[](auto& g) {
+         g.json["bufferViews"][1]["byteOffset"] = std::numeric_limits<uint64_t>::max();
+       },
        "bufferViews[1]: reaches past the end of its buffer of "},
       {[](auto& g) { g.json["bufferViews"][1]["extensions"]["EXT_meshopt_compression"] = {}; },
        "bufferViews[1].extensions: unsupported: EXT_meshopt_compression"},
-      {[](auto& g) { g.json["buffers"] = {{{"byteLength", 4000}}}; }, "buffers[0].byteLength: 4000 bytes, the binary chunk has "},
+      {[](auto& g) { g.json["buffers"] = {{{"byteLength", 4000}}}; },
+       "buffers[0].byteLength: 4000 bytes, the binary chunk has "},
       {[](auto& g) { g.json["buffers"] = {{{"byteLength", 4}, {"uri", "/etc/passwd"}}}; },
        "bufferViews[0].buffer: unsupported: only the file's own binary chunk is read"},
   };
   for (const auto& [change, wanted] : cases)
-    EXPECT_EQ(error_of(change).rfind("a.glb: " + wanted, 0), 0u) << error_of(change) << "\nwanted " << wanted;
+    EXPECT_EQ(error_of(change).rfind("a.glb: " + wanted, 0), 0u)
+        << error_of(change) << "\nwanted " << wanted;
 }
 
 TEST(Gltf, BadKeysAreNamed) {
-  const auto error = [](const std::vector<float>& times, const std::vector<float>& values, const std::string& path) {
+  const auto error = [](const std::vector<float>& times, const std::vector<float>& values,
+                        const std::string& path) {
     GlbBuilder glb;
     glb.node("root", -1);
     glb.track(0, path, "LINEAR", times, values);
     return test::input_error([&] { parse(glb.file()); });
   };
-  const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              infinity = std::numeric_limits<float>::infinity();
   const std::vector<float> two(6, 1.0f);
-  EXPECT_EQ(error({0, nan}, two, "translation"), "a.glb: accessors[0]: element 1: not finite or out of range");
-  EXPECT_EQ(error({0, infinity}, two, "translation"), "a.glb: accessors[0]: element 1: not finite or out of range");
-  EXPECT_EQ(error({-1, 0}, two, "translation"), "a.glb: animations[0].samplers[0].input: key 0: not within 0 and 1e5 s");
-  EXPECT_EQ(error({1, 1}, two, "translation"), "a.glb: animations[0].samplers[0].input: key 1: not later than the one before");
-  EXPECT_EQ(error({1, 0.5f}, two, "translation"), "a.glb: animations[0].samplers[0].input: key 1: not later than the one before");
-  EXPECT_EQ(error({0, 1}, {1, 2, 3, 4, nan, 6}, "translation"), "a.glb: accessors[1]: element 1: not finite or out of range");
-  EXPECT_EQ(error({0, 1, 2}, two, "translation"), "a.glb: animations[0].samplers[0].output: 2 values for 3 keys");
-  EXPECT_EQ(error({0}, {0, 0, 0, 0}, "rotation"), "a.glb: animations[0].samplers[0].output: key 0: a quaternion of no length");
-  EXPECT_EQ(error({0}, {1, 1, -1}, "scale"), "a.glb: animations[0].samplers[0].output: key 0: mirrored");
+  EXPECT_EQ(error({0, nan}, two, "translation"),
+            "a.glb: accessors[0]: element 1: not finite or out of range");
+  EXPECT_EQ(error({0, infinity}, two, "translation"),
+            "a.glb: accessors[0]: element 1: not finite or out of range");
+  EXPECT_EQ(error({-1, 0}, two, "translation"),
+            "a.glb: animations[0].samplers[0].input: key 0: not within 0 and 1e5 s");
+  EXPECT_EQ(error({1, 1}, two, "translation"),
+            "a.glb: animations[0].samplers[0].input: key 1: not later than the one before");
+  EXPECT_EQ(error({1, 0.5f}, two, "translation"),
+            "a.glb: animations[0].samplers[0].input: key 1: not later than the one before");
+  EXPECT_EQ(error({0, 1}, {1, 2, 3, 4, nan, 6}, "translation"),
+            "a.glb: accessors[1]: element 1: not finite or out of range");
+  EXPECT_EQ(error({0, 1, 2}, two, "translation"),
+            "a.glb: animations[0].samplers[0].output: 2 values for 3 keys");
+  EXPECT_EQ(error({0}, {0, 0, 0, 0}, "rotation"),
+            "a.glb: animations[0].samplers[0].output: key 0: a quaternion of no length");
+  EXPECT_EQ(error({0}, {1, 1, -1}, "scale"),
+            "a.glb: animations[0].samplers[0].output: key 0: mirrored");
 }
 
 TEST(Gltf, DepthAndCountsAreLimited) {
-  const std::string deep = "{\"asset\":{\"version\":\"2.0\"},\"extras\":" + std::string(1000000, '[') + std::string(1000000, ']') + "}";
+  const std::string deep =
+      "{\"asset\":{\"version\":\"2.0\"},\"extras\":" + std::string(1000000, '[') +
+      std::string(1000000, ']') + "}";
   EXPECT_EQ(test::input_error([&] { parse(GlbBuilder::file(deep, "")); }), "a.glb: nodes: missing");
   EXPECT_EQ(error_of([](GlbBuilder& glb) {
               for (int i = 0; i < 5000; ++i) glb.node("n", -1);
@@ -297,11 +368,16 @@ TEST(Gltf, DepthAndCountsAreLimited) {
   std::vector<float> times(100000);
   for (size_t i = 0; i < times.size(); ++i) times[i] = static_cast<float>(i);
   const int input = many.accessor(times, 5126, "SCALAR", 1);
-  for (int i = 0; i < 700; ++i) many.channel(many.node("n", -1), "translation", "LINEAR", input, output);
-  EXPECT_NE(test::input_error([&] { parse(many.file()); }).find("more than 2^26 key values in the animation"), std::string::npos);
+  for (int i = 0; i < 700; ++i)
+    many.channel(many.node("n", -1), "translation", "LINEAR", input, output);
+  EXPECT_NE(test::input_error([&] {
+              parse(many.file());
+            }).find("more than 2^26 key values in the animation"),
+            std::string::npos);
   // Text of the file does not break the line of a message, nor make it long.
-  const std::string error =
-      error_of([](GlbBuilder& glb) { glb.json["animations"][0]["channels"][0]["target"]["path"] = "a\nb" + std::string(9999, 'x'); });
+  const std::string error = error_of([](GlbBuilder& glb) {
+    glb.json["animations"][0]["channels"][0]["target"]["path"] = "a\nb" + std::string(9999, 'x');
+  });
   EXPECT_EQ(error.find('\n'), std::string::npos);
   EXPECT_LT(error.size(), 250u);
 }

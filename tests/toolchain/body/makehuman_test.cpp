@@ -1,4 +1,5 @@
-// The base mesh, its skin, its joints and its people, against the numbers of docs/decisions/0002-body-data.md.
+// The base mesh, its skin, its joints and its people, against the numbers of
+// docs/decisions/0002-body-data.md.
 #include "toolchain/body/makehuman.h"
 
 #include <algorithm>
@@ -17,7 +18,8 @@ namespace {
 
 std::string directory() {
   const char* environment = std::getenv("FIGURINE_MAKEHUMAN");
-  return environment == nullptr ? "FIGURINE_MAKEHUMAN is not set: run this through scripts/run" : environment;
+  return environment == nullptr ? "FIGURINE_MAKEHUMAN is not set: run this through scripts/run"
+                                : environment;
 }
 
 const MakeHuman& makehuman() {
@@ -45,7 +47,8 @@ float height_m(const std::vector<float>& vertices) {
 
 double mean_distance(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0;
-  for (size_t i = 0; i < a.size(); i += 3) sum += std::hypot(std::hypot(a[i] - b[i], a[i + 1] - b[i + 1]), a[i + 2] - b[i + 2]);
+  for (size_t i = 0; i < a.size(); i += 3)
+    sum += std::hypot(std::hypot(a[i] - b[i], a[i + 1] - b[i + 1]), a[i + 2] - b[i + 2]);
   return sum / static_cast<double>(a.size() / 3);
 }
 
@@ -75,7 +78,8 @@ TEST(MakeHumanMesh, BodyIsNineIslandsThreeOfThemHidden) {
     return i;
   };
   for (size_t t = 0; t < surface.uv_triangles.size(); t += 3) {
-    for (size_t c = 1; c < 3; ++c) parent[find(surface.uv_triangles[t + c])] = find(surface.uv_triangles[t]);
+    for (size_t c = 1; c < 3; ++c)
+      parent[find(surface.uv_triangles[t + c])] = find(surface.uv_triangles[t]);
   }
   std::set<uint32_t> all, hidden;
   for (size_t t = 0; t < surface.triangle_count(); ++t) {
@@ -100,7 +104,8 @@ TEST(MakeHumanMesh, ChartsCover624PerMilleWithoutOverlap) {
     const float* a = &s.uv[2 * size_t{s.uv_triangles[t]}];
     const float* b = &s.uv[2 * size_t{s.uv_triangles[t + 1]}];
     const float* c = &s.uv[2 * size_t{s.uv_triangles[t + 2]}];
-    area += 0.5 * std::abs((double{b[0]} - a[0]) * (double{c[1]} - a[1]) - (double{b[1]} - a[1]) * (double{c[0]} - a[0]));
+    area += 0.5 * std::abs((double{b[0]} - a[0]) * (double{c[1]} - a[1]) -
+                           (double{b[1]} - a[1]) * (double{c[0]} - a[0]));
   }
   EXPECT_NEAR(static_cast<double>(covered) / (256 * 256), area, 1e-3);
 }
@@ -136,7 +141,9 @@ TEST(MakeHumanSkin, EightInfluencesLoseNothingFourLoseAtMost76PerMille) {
 }
 
 TEST(MakeHumanPeople, AreOfPlausibleHeightAndStandOnTheGround) {
-  const auto height = [](float gender, float h) { return height_m(makehuman().vertices({.gender = gender, .height = h})); };
+  const auto height = [](float gender, float h) {
+    return height_m(makehuman().vertices({.gender = gender, .height = h}));
+  };
   EXPECT_NEAR(height(0, 0.5f), 1.62, 0.06);
   EXPECT_NEAR(height(1, 0.5f), 1.74, 0.06);
   EXPECT_GT(height(1, 0.55f), height(1, 0.5f) + 0.04);
@@ -150,32 +157,35 @@ TEST(MakeHumanPeople, AreOfPlausibleHeightAndStandOnTheGround) {
     shortest = std::min(shortest, height_m(v));
     tallest = std::max(tallest, height_m(v));
   }
-  std::printf("50 people from %.2f to %.2f m; soles at most %.1f mm from the ground\n", double{shortest}, double{tallest},
-              1e3 * double{worst});
+  std::printf("50 people from %.2f to %.2f m; soles at most %.1f mm from the ground\n",
+              double{shortest}, double{tallest}, 1e3 * double{worst});
   EXPECT_LT(worst, 0.005);
   EXPECT_GT(shortest, 1.40);
   EXPECT_LT(tallest, 2.00);
 }
 
 TEST(MakeHumanPeople, AttributesDoWhatTheirNamesSay) {
-  const auto girth = [](const MacroShape& shape) {  // mean distance of the trunk's vertices from the vertical axis
-    const std::vector<float> v = makehuman().vertices(shape);
-    double sum = 0;
-    int count = 0;
-    for (size_t i = 0; i < MakeHuman::kBodyVertexCount * 3; i += 3) {
-      if (makehuman().skin_joints()[i / 3 * kSkinInfluences] != kSpine1) continue;
-      sum += std::hypot(v[i], v[i + 2]);
-      ++count;
-    }
-    return sum / count;
-  };
+  const auto girth =
+      [](const MacroShape& shape) {  // mean distance of the trunk's vertices from the vertical axis
+        const std::vector<float> v = makehuman().vertices(shape);
+        double sum = 0;
+        int count = 0;
+        for (size_t i = 0; i < MakeHuman::kBodyVertexCount * 3; i += 3) {
+          if (makehuman().skin_joints()[i / 3 * kSkinInfluences] != kSpine1) continue;
+          sum += std::hypot(v[i], v[i + 2]);
+          ++count;
+        }
+        return sum / count;
+      };
   EXPECT_GT(girth({.weight = 1}), girth({.weight = 0.5f}) + 0.006);
   EXPECT_LT(girth({.weight = 0}), girth({.weight = 0.5f}) - 0.003);
   // Mixtures are mixtures: half a woman, half a man is the mean of both.
-  const std::vector<float> woman = makehuman().vertices({.gender = 0}), man = makehuman().vertices({.gender = 1}),
+  const std::vector<float> woman = makehuman().vertices({.gender = 0}),
+                           man = makehuman().vertices({.gender = 1}),
                            both = makehuman().vertices({});
   double worst = 0;
-  for (size_t i = 0; i < both.size(); ++i) worst = std::max(worst, std::abs(double{both[i]} - 0.5 * (double{woman[i]} + man[i])));
+  for (size_t i = 0; i < both.size(); ++i)
+    worst = std::max(worst, std::abs(double{both[i]} - 0.5 * (double{woman[i]} + man[i])));
   EXPECT_LT(worst, 2e-6);
   // Outside the ranges: clamped.
   EXPECT_EQ(makehuman().vertices({.gender = 7}), man);
@@ -205,16 +215,18 @@ TEST(ShapeBasis, HeldOutPeopleAreWithinHalfAMillimetre) {
   double vertex_error = 0, joint_error = 0, worst = 0;
   constexpr int kPeople = 60;
   for (int i = 0; i < kPeople; ++i) {
-    const std::vector<float> person = makehuman().vertices(sample_macro_shape((uint64_t{999} << 32) + static_cast<uint64_t>(i)));
+    const std::vector<float> person =
+        makehuman().vertices(sample_macro_shape((uint64_t{999} << 32) + static_cast<uint64_t>(i)));
     const std::vector<float> shape = project_shape(model(), body_part(person));
     const double error = mean_distance(shaped_vertices(model(), shape), body_part(person));
     vertex_error += error / kPeople;
     worst = std::max(worst, error);
     const JointPositions got = shaped_joints(model(), shape), wanted = makehuman().joints(person);
-    joint_error += mean_distance({got.begin(), got.end()}, {wanted.begin(), wanted.end()}) / kPeople;
+    joint_error +=
+        mean_distance({got.begin(), got.end()}, {wanted.begin(), wanted.end()}) / kPeople;
   }
-  std::printf("held-out people: vertices %.3f mm, joints %.3f mm, worst person %.3f mm\n", 1e3 * vertex_error, 1e3 * joint_error,
-              1e3 * worst);
+  std::printf("held-out people: vertices %.3f mm, joints %.3f mm, worst person %.3f mm\n",
+              1e3 * vertex_error, 1e3 * joint_error, 1e3 * worst);
   EXPECT_LT(vertex_error, 0.5e-3);
   EXPECT_LT(joint_error, 0.5e-3);
 }
@@ -223,8 +235,9 @@ TEST(ShapeBasis, CoefficientsAreInStandardDeviations) {
   double sum[20] = {}, square[20] = {};
   constexpr int kPeople = 200;
   for (int i = 0; i < kPeople; ++i) {
-    const std::vector<float> shape =
-        project_shape(model(), body_part(makehuman().vertices(sample_macro_shape((uint64_t{1} << 32) + static_cast<uint64_t>(i)))));
+    const std::vector<float> shape = project_shape(
+        model(), body_part(makehuman().vertices(
+                     sample_macro_shape((uint64_t{1} << 32) + static_cast<uint64_t>(i)))));
     for (int s = 0; s < 20; ++s) {
       sum[s] += shape[static_cast<size_t>(s)];
       square[s] += double{shape[static_cast<size_t>(s)]} * shape[static_cast<size_t>(s)];
@@ -251,8 +264,9 @@ TEST(MakeHumanLoad, NamesFileAndReason) {
   // The package with one file replaced at a time.
   const test::TemporaryFolder folder;
   namespace fs = std::filesystem;
-  const std::string targets = "public/data/targets/targets.bin", list = "src/json/targets/target-list.json",
-                    rig = "src/json/rigs/default.json", mesh = "public/data/models/human_full_size.json";
+  const std::string targets = "public/data/targets/targets.bin",
+                    list = "src/json/targets/target-list.json", rig = "src/json/rigs/default.json",
+                    mesh = "public/data/models/human_full_size.json";
   const auto with = [&](const std::string& replaced, const std::string& text) {
     fs::remove_all(folder / "copy");
     for (const std::string& file : {targets, list, rig, mesh}) {
@@ -267,10 +281,13 @@ TEST(MakeHumanLoad, NamesFileAndReason) {
     return test::input_error([&] { MakeHuman::load(folder / "copy"); });
   };
   EXPECT_NE(with(targets, "short").find("targets.bin: size"), std::string::npos);
-  EXPECT_NE(with(list, "{\"targets\": {\"a.target\": []}}").find("target-list.json: targets: 1, expected 1258"), std::string::npos);
+  EXPECT_NE(with(list, "{\"targets\": {\"a.target\": []}}")
+                .find("target-list.json: targets: 1, expected 1258"),
+            std::string::npos);
   EXPECT_NE(with(rig, "{\"bones\": {}, \"joints\": {}}").find("default.json"), std::string::npos);
   EXPECT_NE(with(mesh, "{\"vertices\": [1, 2").find("not valid JSON"), std::string::npos);
-  EXPECT_NE(with(mesh, "{\"vertices\": [1, 2]}").find("vertices: 2 values, expected 57474"), std::string::npos);
+  EXPECT_NE(with(mesh, "{\"vertices\": [1, 2]}").find("vertices: 2 values, expected 57474"),
+            std::string::npos);
   EXPECT_NE(with(mesh, "{\"vertices\": \"x\"}").find("vertices"), std::string::npos);
 }
 

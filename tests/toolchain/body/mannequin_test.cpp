@@ -1,4 +1,5 @@
-// The mannequin as a surface: closed, outward, symmetric, every part with texels, its shape space close to linear.
+// The mannequin as a surface: closed, outward, symmetric, every part with texels, its shape space
+// close to linear.
 #include "toolchain/body/mannequin.h"
 
 #include <algorithm>
@@ -57,7 +58,8 @@ TEST(Mannequin, LeftAndRightMirror) {
   for (uint32_t left = 0; left < kJointCount; ++left) {
     const std::string& name = joint_names()[left];
     if (name.rfind("left_", 0) != 0) continue;
-    const auto found = std::find(joint_names().begin(), joint_names().end(), "right_" + name.substr(5));
+    const auto found =
+        std::find(joint_names().begin(), joint_names().end(), "right_" + name.substr(5));
     ASSERT_NE(found, joint_names().end());
     const size_t right = static_cast<size_t>(found - joint_names().begin());
     EXPECT_NEAR(j[3 * left], -j[3 * right], 1e-6) << name;
@@ -82,7 +84,8 @@ TEST(Mannequin, EveryPartHasTexelsAt32AndNoneOverlap) {
   const TexelBody body = make_texel_body(model(), 32);
   std::map<int, int> texels;  // by heaviest joint
   for (size_t row = 0; row < body.texel.size(); ++row) ++texels[body.joints[row * kSkinInfluences]];
-  for (int j : {int(kHead), int(kLeftThumb1), int(kRightPinky1 + 1), int(kLeftWrist), int(kRightFoot), int(kSpine2), int(kLeftElbow)}) {
+  for (int j : {int(kHead), int(kLeftThumb1), int(kRightPinky1 + 1), int(kLeftWrist),
+                int(kRightFoot), int(kSpine2), int(kLeftElbow)}) {
     EXPECT_GE(texels[j], 2) << joint_names()[static_cast<size_t>(j)];
   }
   // Without overlap, areas of the charts add up to the covered area.
@@ -92,21 +95,31 @@ TEST(Mannequin, EveryPartHasTexelsAt32AndNoneOverlap) {
     const float* a = &s.uv[2 * size_t{s.uv_triangles[t]}];
     const float* b = &s.uv[2 * size_t{s.uv_triangles[t + 1]}];
     const float* c = &s.uv[2 * size_t{s.uv_triangles[t + 2]}];
-    area += 0.5 * std::abs((double{b[0]} - a[0]) * (double{c[1]} - a[1]) - (double{b[1]} - a[1]) * (double{c[0]} - a[0]));
+    area += 0.5 * std::abs((double{b[0]} - a[0]) * (double{c[1]} - a[1]) -
+                           (double{b[1]} - a[1]) * (double{c[0]} - a[0]));
   }
-  EXPECT_NEAR(static_cast<double>(make_texel_body(model(), 512).texel.size()) / (512 * 512), area, 2e-3);
+  EXPECT_NEAR(static_cast<double>(make_texel_body(model(), 512).texel.size()) / (512 * 512), area,
+              2e-3);
 }
 
 TEST(Mannequin, ShapeSpaceIsCloseToTheBuilder) {
-  const MannequinShape shapes[] = {
-      {.stature = 1}, {.girth = -1}, {.legs = 1}, {.shoulders = -1}, {.stature = 1, .girth = -1, .legs = 1, .shoulders = 1}};
+  const MannequinShape shapes[] = {{.stature = 1},
+                                   {.girth = -1},
+                                   {.legs = 1},
+                                   {.shoulders = -1},
+                                   {.stature = 1, .girth = -1, .legs = 1, .shoulders = 1}};
   double worst = 0;
   for (const MannequinShape& shape : shapes) {
-    const std::vector<float> coefficients = {shape.stature, shape.girth, shape.legs, shape.shoulders};
-    const std::vector<float> linear = shaped_vertices(model(), coefficients), own = mannequin_vertices(shape);
-    const JointPositions joints = shaped_joints(model(), coefficients), own_joints = mannequin_joints(shape);
-    for (size_t i = 0; i < own.size(); ++i) worst = std::max(worst, std::abs(double{own[i]} - linear[i]));
-    for (size_t i = 0; i < own_joints.size(); ++i) worst = std::max(worst, std::abs(double{own_joints[i]} - joints[i]));
+    const std::vector<float> coefficients = {shape.stature, shape.girth, shape.legs,
+                                             shape.shoulders};
+    const std::vector<float> linear = shaped_vertices(model(), coefficients),
+                             own = mannequin_vertices(shape);
+    const JointPositions joints = shaped_joints(model(), coefficients),
+                         own_joints = mannequin_joints(shape);
+    for (size_t i = 0; i < own.size(); ++i)
+      worst = std::max(worst, std::abs(double{own[i]} - linear[i]));
+    for (size_t i = 0; i < own_joints.size(); ++i)
+      worst = std::max(worst, std::abs(double{own_joints[i]} - joints[i]));
     const std::vector<float> back = project_shape(model(), linear);
     for (size_t s = 0; s < 4; ++s) EXPECT_NEAR(back[s], coefficients[s], 1e-3);
   }

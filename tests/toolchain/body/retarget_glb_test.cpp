@@ -1,4 +1,5 @@
-// glTF clips on a body: a made skeleton whose poses are known, hostile ones, and the emotes of @dcl/wearable-preview.
+// glTF clips on a body: a made skeleton whose poses are known, hostile ones, and the emotes of
+// @dcl/wearable-preview.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -31,7 +32,8 @@ const TexelBody& texels() {
   return body;
 }
 
-// A joint of the made person: its place in the T-pose, in centimetres, and which way its axes lie there.
+// A joint of the made person: its place in the T-pose, in centimetres, and which way its axes lie
+// there.
 struct Made {
   const char* name;
   const char* parent;
@@ -42,9 +44,10 @@ struct Made {
 std::vector<Made> person() {
   const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
   const Vec3 foot(0, -std::sin(26 * std::numbers::pi / 180), std::cos(26 * std::numbers::pi / 180));
-  std::vector<Made> out = {{"Hips", "", {0, 100, 0}, -x, -y},      {"Spine", "Hips", {0, 107, 0}, x, y},
-                           {"Spine1", "Spine", {0, 121, 0}, x, y}, {"Spine2", "Spine1", {0, 135, 0}, x, y},
-                           {"Neck", "Spine2", {0, 149, 0}, x, y},  {"Head", "Neck", {0, 165, 0}, x, y}};
+  std::vector<Made> out = {
+      {"Hips", "", {0, 100, 0}, -x, -y},      {"Spine", "Hips", {0, 107, 0}, x, y},
+      {"Spine1", "Spine", {0, 121, 0}, x, y}, {"Spine2", "Spine1", {0, 135, 0}, x, y},
+      {"Neck", "Spine2", {0, 149, 0}, x, y},  {"Head", "Neck", {0, 165, 0}, x, y}};
   out.insert(out.end(), {{"LeftUpLeg", "Hips", {9, 94, 0}, -x, -y},
                          {"LeftLeg", "LeftUpLeg", {9, 49, 0}, -x, -y},
                          {"LeftFoot", "LeftLeg", {9, 8, 0}, x, foot},
@@ -60,8 +63,8 @@ std::vector<Made> person() {
   const size_t count = out.size();
   static const std::map<std::string, std::string> kOther = [] {
     std::map<std::string, std::string> names;
-    for (const char* part : {"UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand", "HandIndex1", "HandIndex2",
-                             "HandIndex3", "HandMiddle1"}) {
+    for (const char* part : {"UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm",
+                             "Hand", "HandIndex1", "HandIndex2", "HandIndex3", "HandMiddle1"}) {
       names[std::string("Left") + part] = std::string("Right") + part;
     }
     return names;
@@ -69,7 +72,9 @@ std::vector<Made> person() {
   for (size_t i = 6; i < count; ++i) {
     const Made& left = out[i];
     const auto parent = kOther.find(left.parent);
-    Made right{kOther.at(left.name).c_str(), parent == kOther.end() ? left.parent : parent->second.c_str(), left.place, left.x, left.y};
+    Made right{kOther.at(left.name).c_str(),
+               parent == kOther.end() ? left.parent : parent->second.c_str(), left.place, left.x,
+               left.y};
     right.place.x() = -right.place.x();
     right.y.x() = -right.y.x();  // arms along -x; legs and feet are the same
     out.push_back(right);
@@ -86,10 +91,12 @@ struct MadeFile {
   std::map<std::string, int> node;
   std::map<std::string, Quat> rest;  // to the parent, in the T-pose
 
-  // plain: all axes parallel to the world's, so that only the T-pose itself tells the directions of bones.
+  // plain: all axes parallel to the world's, so that only the T-pose itself tells the directions of
+  // bones.
   explicit MadeFile(const std::string& prefix = "Avatar_", bool plain = false) {
     const Quat armature(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()));
-    node[""] = glb.node("Armature", -1, {{"rotation", list(armature)}, {"scale", {0.01, 0.01, 0.01}}});
+    node[""] =
+        glb.node("Armature", -1, {{"rotation", list(armature)}, {"scale", {0.01, 0.01, 0.01}}});
     std::map<std::string, std::pair<Quat, Vec3>> world = {{"", {armature, Vec3::Zero()}}};
     for (const Made& joint : person()) {
       Eigen::Matrix3d axes;
@@ -99,16 +106,20 @@ struct MadeFile {
       rest[joint.name] = parent_rotation.conjugate() * rotation;
       node[joint.name] = glb.node(
           prefix + joint.name, node.at(joint.parent),
-          {{"translation", list(Vec3(parent_rotation.conjugate() * (joint.place - parent_place)))}, {"rotation", list(rest[joint.name])}});
+          {{"translation", list(Vec3(parent_rotation.conjugate() * (joint.place - parent_place)))},
+           {"rotation", list(rest[joint.name])}});
       world[joint.name] = {rotation, joint.place};
     }
   }
 
   // From the T-pose at time 0 to a further turn in the joint's own frame at time 1.
-  void turn(const std::string& joint, double degrees, const Vec3& axis, const char* interpolation = "LINEAR") {
-    const Quat end = rest.at(joint) * Quat(Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis));
+  void turn(const std::string& joint, double degrees, const Vec3& axis,
+            const char* interpolation = "LINEAR") {
+    const Quat end =
+        rest.at(joint) * Quat(Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis));
     std::vector<float> values;
-    for (const Quat& q : {rest.at(joint), end}) values.insert(values.end(), {float(q.x()), float(q.y()), float(q.z()), float(q.w())});
+    for (const Quat& q : {rest.at(joint), end})
+      values.insert(values.end(), {float(q.x()), float(q.y()), float(q.z()), float(q.w())});
     glb.track(node.at(joint), "rotation", interpolation, {0, 1}, values);
   }
 
@@ -121,7 +132,9 @@ struct MadeFile {
 
 using Joints = std::vector<Eigen::Vector3f>;
 
-Joints joints_at(const MotionClip& clip, uint32_t frame) { return joints_of(texels().view(), clip.pose(frame).view()); }
+Joints joints_at(const MotionClip& clip, uint32_t frame) {
+  return joints_of(texels().view(), clip.pose(frame).view());
+}
 
 void expect_t_pose(const Joints& joints) {
   for (const auto& [from, to, x] : {std::tuple{kLeftShoulder, kLeftElbow, 1.0f},
@@ -145,7 +158,8 @@ TEST(RetargetGlb, ATPoseToldByBoneAxesBecomesATPose) {
   MadeFile file;
   file.turn("Spine", 0, Vec3::UnitX());
   RetargetReport report;
-  const MotionClip clip = retarget_glb(file.write(folder), texels().view(), {.frames_per_second = 30}, &report);
+  const MotionClip clip =
+      retarget_glb(file.write(folder), texels().view(), {.frames_per_second = 30}, &report);
   EXPECT_EQ(clip.frame_count, 31u);
   expect_t_pose(joints_at(clip, 0));
   expect_t_pose(joints_at(clip, 30));
@@ -164,10 +178,14 @@ TEST(RetargetGlb, ATPoseOfAnyAxesIsReadFromTheNodesOrTheFirstFrame) {
     if (neutral == Neutral::kZeroPose) expect_t_pose(joints_at(clip, 0));
     const Joints joints = joints_at(clip, clip.frame_count - 1);
     const float a = 40 * std::numbers::pi_v<float> / 180;
-    EXPECT_GT(direction(joints, kLeftElbow, kLeftWrist).dot(Eigen::Vector3f(std::cos(a), 0, std::sin(a))), 0.99999f);
+    EXPECT_GT(
+        direction(joints, kLeftElbow, kLeftWrist).dot(Eigen::Vector3f(std::cos(a), 0, std::sin(a))),
+        0.99999f);
     EXPECT_GT(direction(joints, kRightElbow, kRightWrist).x(), -1.0001f);
     // The same file says nothing by its axes.
-    EXPECT_NE(test::input_error([&] { retarget_glb(path, texels().view(), {}); }).find("its y axis is not along the bone"),
+    EXPECT_NE(test::input_error([&] {
+                retarget_glb(path, texels().view(), {});
+              }).find("its y axis is not along the bone"),
               std::string::npos);
   }
 }
@@ -175,30 +193,37 @@ TEST(RetargetGlb, ATPoseOfAnyAxesIsReadFromTheNodesOrTheFirstFrame) {
 TEST(RetargetGlb, JointsTurnAboutTheirOwnAxes) {
   const test::TemporaryFolder folder;
   MadeFile file;
-  file.turn("LeftForeArm", -40, Vec3::UnitX());  // elbows bend forward, to opposite sides of their own z
+  file.turn("LeftForeArm", -40,
+            Vec3::UnitX());  // elbows bend forward, to opposite sides of their own z
   file.turn("RightForeArm", 40, Vec3::UnitX());
-  file.turn("LeftLeg", -60, Vec3::UnitX());        // a knee bends backward
-  file.turn("LeftHandIndex1", 90, Vec3::UnitZ());  // a finger closes: down, for palms that look down
+  file.turn("LeftLeg", -60, Vec3::UnitX());  // a knee bends backward
+  file.turn("LeftHandIndex1", 90,
+            Vec3::UnitZ());  // a finger closes: down, for palms that look down
   file.turn("RightHandIndex1", 90, Vec3::UnitZ());
-  file.turn("Hips", 90, -Vec3::UnitY());  // their y axis points down: the person turns from +z to +x
+  file.turn("Hips", 90,
+            -Vec3::UnitY());  // their y axis points down: the person turns from +z to +x
   const MotionClip clip = retarget_glb(file.write(folder), texels().view(), {});
   // Half way in time is half way in angle.
   for (const auto& [frame, share] : {std::pair{15u, 0.5f}, {30u, 1.0f}}) {
     const Joints joints = joints_at(clip, frame);
-    const auto turned = [&](float degrees_up, const Eigen::Vector3f& axis, const Eigen::Vector3f& v) -> Eigen::Vector3f {
+    const auto turned = [&](float degrees_up, const Eigen::Vector3f& axis,
+                            const Eigen::Vector3f& v) -> Eigen::Vector3f {
       const float to_rad = share * std::numbers::pi_v<float> / 180;
       const Eigen::Vector3f bent = Eigen::AngleAxisf(degrees_up * to_rad, axis) * v;
       return Eigen::AngleAxisf(90 * to_rad, Eigen::Vector3f::UnitY()) * bent;
     };
-    const Eigen::Vector3f x = Eigen::Vector3f::UnitX(), y = Eigen::Vector3f::UnitY(), z = Eigen::Vector3f::UnitZ();
+    const Eigen::Vector3f x = Eigen::Vector3f::UnitX(), y = Eigen::Vector3f::UnitY(),
+                          z = Eigen::Vector3f::UnitZ();
     EXPECT_GT(direction(joints, kLeftShoulder, kLeftElbow).dot(turned(0, y, x)), 0.99999f);
     EXPECT_GT(direction(joints, kLeftElbow, kLeftWrist).dot(turned(-40, y, x)), 0.99999f);
     EXPECT_GT(direction(joints, kRightElbow, kRightWrist).dot(turned(40, y, -x)), 0.99999f);
     EXPECT_GT(direction(joints, kLeftKnee, kLeftAnkle).dot(turned(60, x, -y)), 0.99999f);
     // Fingers go on from where the bent forearm has them: left about -z, right about z.
-    EXPECT_GT(direction(joints, kLeftIndex1, kLeftIndex1 + 1)
-                  .dot(turned(-40, y, Eigen::AngleAxisf(-90 * share * std::numbers::pi_v<float> / 180, z) * x)),
-              share == 1 ? 0.99999f : 0.95f);
+    EXPECT_GT(
+        direction(joints, kLeftIndex1, kLeftIndex1 + 1)
+            .dot(turned(-40, y,
+                        Eigen::AngleAxisf(-90 * share * std::numbers::pi_v<float> / 180, z) * x)),
+        share == 1 ? 0.99999f : 0.95f);
     if (share == 1) EXPECT_LT(direction(joints, kRightIndex1, kRightIndex1 + 1).y(), -0.99999f);
   }
 }
@@ -212,8 +237,10 @@ TEST(RetargetGlb, StepsAndRates) {
     const MotionClip clip = retarget_glb(path, texels().view(), {.frames_per_second = rate});
     ASSERT_EQ(clip.frame_count, static_cast<uint32_t>(rate) + 1);
     EXPECT_EQ(clip.frames_per_second, rate);
-    EXPECT_GT(direction(joints_at(clip, clip.frame_count - 2), kLeftElbow, kLeftWrist).x(), 0.9999f);
-    EXPECT_GT(direction(joints_at(clip, clip.frame_count - 1), kLeftElbow, kLeftWrist).z(), 0.9999f);
+    EXPECT_GT(direction(joints_at(clip, clip.frame_count - 2), kLeftElbow, kLeftWrist).x(),
+              0.9999f);
+    EXPECT_GT(direction(joints_at(clip, clip.frame_count - 1), kLeftElbow, kLeftWrist).z(),
+              0.9999f);
   }
 }
 
@@ -233,11 +260,14 @@ TEST(RetargetGlb, TheRootsPathIsKeptAndScaledByTheLegs) {
 
 TEST(RetargetGlb, RefusesSkeletonsItDoesNotUnderstand) {
   const test::TemporaryFolder folder;
-  const auto error = [&](const std::function<void(MadeFile&)>& change, const RetargetOptions& options = {}) {
+  const auto error = [&](const std::function<void(MadeFile&)>& change,
+                         const RetargetOptions& options = {}) {
     MadeFile file;
     file.turn("LeftArm", 10, Vec3::UnitX());
     change(file);
-    const std::string path = file.write(folder), message = test::input_error([&] { retarget_glb(path, texels().view(), options); });
+    const std::string path = file.write(folder),
+                      message =
+                          test::input_error([&] { retarget_glb(path, texels().view(), options); });
     EXPECT_EQ(message.find('\n'), std::string::npos);
     EXPECT_EQ(message.rfind(path + ": ", 0), 0u) << message;
     return message.substr(std::min(message.size(), path.size() + 2));
@@ -246,12 +276,18 @@ TEST(RetargetGlb, RefusesSkeletonsItDoesNotUnderstand) {
               for (auto& node : f.glb.json["nodes"]) node["name"] = "bone";
             }),
             "nodes: no joint has a known name (Hips, LeftUpLeg, RightHandIndex1, ...)");
-  EXPECT_EQ(error([](MadeFile& f) { f.glb.json["nodes"][static_cast<size_t>(f.node["RightFoot"])].erase("name"); }),
+  EXPECT_EQ(error([](MadeFile& f) {
+              f.glb.json["nodes"][static_cast<size_t>(f.node["RightFoot"])].erase("name");
+            }),
             "nodes: no joint RightFoot");
-  EXPECT_EQ(error([](MadeFile& f) { f.glb.node("Avatar_Head", -1); }), "nodes[31].name: a second joint Head");
-  EXPECT_EQ(error([](MadeFile& f) { f.glb.json["animations"][0]["channels"] = nlohmann::json::array(); }),
-            "animations[0]: moves none of the skeleton's joints");
-  EXPECT_EQ(error([](MadeFile& f) { f.glb.json["animations"][0]["channels"][0]["target"]["node"] = f.glb.node("prop", -1); }),
+  EXPECT_EQ(error([](MadeFile& f) { f.glb.node("Avatar_Head", -1); }),
+            "nodes[31].name: a second joint Head");
+  EXPECT_EQ(
+      error([](MadeFile& f) { f.glb.json["animations"][0]["channels"] = nlohmann::json::array(); }),
+      "animations[0]: moves none of the skeleton's joints");
+  EXPECT_EQ(error([](MadeFile& f) {
+              f.glb.json["animations"][0]["channels"][0]["target"]["node"] = f.glb.node("prop", -1);
+            }),
             "animations[0]: moves none of the skeleton's joints");
   EXPECT_EQ(error([](MadeFile&) {}, {.animation = 1}), "animations: no number 1: there are 1");
   EXPECT_EQ(error([](MadeFile&) {}, {.start = 31}), "start 31: the clip has 31 frames");
@@ -259,29 +295,41 @@ TEST(RetargetGlb, RefusesSkeletonsItDoesNotUnderstand) {
   // A mirrored skeleton: the left leg on the right.
   EXPECT_NE(error([](MadeFile& f) {
               for (const char* side : {"Left", "Right"}) {
-                auto& place = f.glb.json["nodes"][static_cast<size_t>(f.node[std::string(side) + "UpLeg"])]["translation"];
+                auto& place =
+                    f.glb.json["nodes"][static_cast<size_t>(f.node[std::string(side) + "UpLeg"])]
+                              ["translation"];
                 place[0] = -place[0].get<double>();
               }
             }).find("(Avatar_Hips): the left leg is not at -x of its axes"),
             std::string::npos);
-  EXPECT_NE(
-      error([](MadeFile& f) { f.glb.json["nodes"][0]["scale"] = {0, 0, 0}; }, {.neutral = Neutral::kZeroPose}).find("legs of no length"),
-      std::string::npos);
+  EXPECT_NE(error([](MadeFile& f) { f.glb.json["nodes"][0]["scale"] = {0, 0, 0}; },
+                  {.neutral = Neutral::kZeroPose})
+                .find("legs of no length"),
+            std::string::npos);
   EXPECT_NE(error([](MadeFile& f) {
-              f.glb.json["nodes"][0]["scale"] = {1e6, 1e6, 1e6}, f.glb.json["nodes"][1]["scale"] = {1e6, 1e6, 1e6};
+              f.glb.json["nodes"][0]["scale"] = {1e6, 1e6, 1e6},
+              f.glb.json["nodes"][1]["scale"] = {1e6, 1e6, 1e6};
             }).find("its place in the world is out of range"),
             std::string::npos);
   // A day of one frame a millisecond is not asked for by a file of two keys.
-  EXPECT_EQ(error([](MadeFile& f) { f.glb.track(f.node["Head"], "translation", "LINEAR", {0, 99999}, {0, 16, 0, 0, 16, 0}); }),
+  EXPECT_EQ(error([](MadeFile& f) {
+              f.glb.track(f.node["Head"], "translation", "LINEAR", {0, 99999},
+                          {0, 16, 0, 0, 16, 0});
+            }),
             "animations[0]: more than 2^18 frames");
   test::write_text(folder / "empty.glb", "");
-  EXPECT_NE(
-      test::input_error([&] { retarget_glb(folder / "empty.glb", texels().view(), {}); }).find("empty.glb: header: the file ends early"),
-      std::string::npos);
-  EXPECT_NE(test::input_error([&] { retarget_glb(folder / "none.glb", texels().view(), {}); }).find("none.glb"), std::string::npos);
+  EXPECT_NE(test::input_error([&] {
+              retarget_glb(folder / "empty.glb", texels().view(), {});
+            }).find("empty.glb: header: the file ends early"),
+            std::string::npos);
+  EXPECT_NE(test::input_error([&] {
+              retarget_glb(folder / "none.glb", texels().view(), {});
+            }).find("none.glb"),
+            std::string::npos);
 }
 
-// Sixteen clips of people, made by animators and from captures; scripts/setup toolchain fetches them, scripts/run names the folder.
+// Sixteen clips of people, made by animators and from captures; scripts/setup toolchain fetches
+// them, scripts/run names the folder.
 std::vector<std::string> emotes() {
   const char* folder = std::getenv("FIGURINE_EMOTES");
   std::vector<std::string> paths;
@@ -299,9 +347,11 @@ std::map<std::string, Vec3> source_places(const Gltf& gltf, double time_s) {
   std::map<std::string, Vec3> out;
   for (const GltfNode& node : gltf.nodes) {
     Eigen::Affine3d world = Eigen::Affine3d::Identity();
-    for (int n = static_cast<int>(&node - gltf.nodes.data()); n >= 0; n = gltf.nodes[static_cast<size_t>(n)].parent) {
+    for (int n = static_cast<int>(&node - gltf.nodes.data()); n >= 0;
+         n = gltf.nodes[static_cast<size_t>(n)].parent) {
       const GltfTransform& own = local[static_cast<size_t>(n)];
-      world = Eigen::Translation3d(own.translation) * own.rotation * Eigen::Scaling(own.scale) * world;
+      world =
+          Eigen::Translation3d(own.translation) * own.rotation * Eigen::Scaling(own.scale) * world;
     }
     out[node.name] = world.translation();
   }
@@ -309,14 +359,16 @@ std::map<std::string, Vec3> source_places(const Gltf& gltf, double time_s) {
 }
 
 TEST(RetargetGlb, EmotesKeepTheirBonesDirectionsAndTheirHinges) {
-  ASSERT_EQ(emotes().size(), 16u) << "FIGURINE_EMOTES: run this through scripts/run, after scripts/setup toolchain";
+  ASSERT_EQ(emotes().size(), 16u)
+      << "FIGURINE_EMOTES: run this through scripts/run, after scripts/setup toolchain";
   for (const std::string& path : emotes()) {
     const std::string name = std::filesystem::path(path).stem().string();
     RetargetReport report;
     const MotionClip clip = retarget_glb(path, texels().view(), {.name = name}, &report);
     const Gltf gltf = read_glb(path);
     double first = 1e9;
-    for (const GltfTrack& track : gltf.tracks) first = std::min(first, double{track.times_s.front()});
+    for (const GltfTrack& track : gltf.tracks)
+      first = std::min(first, double{track.times_s.front()});
     float limbs = 0, fingers = 0, knee = 1, elbow = 1;
     for (uint32_t f = 0; f < clip.frame_count; f += 3) {
       const std::map<std::string, Vec3> places = source_places(gltf, first + f / 30.0);
@@ -324,16 +376,19 @@ TEST(RetargetGlb, EmotesKeepTheirBonesDirectionsAndTheirHinges) {
       for (int side = 0; side < 2; ++side) {
         const std::string s = side == 0 ? "Avatar_Left" : "Avatar_Right";
         const auto off = [&](const std::string& from, const std::string& to, int a, int b) {
-          const Eigen::Vector3f wanted = (places.at(s + to) - places.at(s + from)).normalized().cast<float>();
+          const Eigen::Vector3f wanted =
+              (places.at(s + to) - places.at(s + from)).normalized().cast<float>();
           return std::acos(std::min(1.0f, wanted.dot(direction(joints, a, b))));
         };
-        limbs = std::max(
-            {limbs, off("UpLeg", "Leg", kLeftHip + side, kLeftKnee + side), off("Leg", "Foot", kLeftKnee + side, kLeftAnkle + side),
-             off("Arm", "ForeArm", kLeftShoulder + side, kLeftElbow + side), off("ForeArm", "Hand", kLeftElbow + side, kLeftWrist + side)});
+        limbs = std::max({limbs, off("UpLeg", "Leg", kLeftHip + side, kLeftKnee + side),
+                          off("Leg", "Foot", kLeftKnee + side, kLeftAnkle + side),
+                          off("Arm", "ForeArm", kLeftShoulder + side, kLeftElbow + side),
+                          off("ForeArm", "Hand", kLeftElbow + side, kLeftWrist + side)});
         int joint = side == 0 ? kLeftIndex1 : kRightIndex1;
         for (const char* finger : {"Index", "Middle", "Pinky", "Ring", "Thumb"}) {
           const std::string of = std::string("Hand") + finger;
-          fingers = std::max({fingers, off(of + "1", of + "2", joint, joint + 1), off(of + "2", of + "3", joint + 1, joint + 2)});
+          fingers = std::max({fingers, off(of + "1", of + "2", joint, joint + 1),
+                              off(of + "2", of + "3", joint + 1, joint + 2)});
           joint += 3;
         }
         // A shin that turns backwards turns about the thigh's left.
@@ -348,18 +403,24 @@ TEST(RetargetGlb, EmotesKeepTheirBonesDirectionsAndTheirHinges) {
         };
         const Eigen::Vector3f thigh = direction(joints, kLeftHip + side, kLeftKnee + side),
                               shin = direction(joints, kLeftKnee + side, kLeftAnkle + side);
-        knee = std::min(knee, thigh.cross(shin).dot(turned(kLeftHip + side, Eigen::Vector3f::UnitX())));
-        // A forearm that bends forward turns about the upper arm's own vertical of the T-pose, in which the mannequin rests.
+        knee = std::min(knee,
+                        thigh.cross(shin).dot(turned(kLeftHip + side, Eigen::Vector3f::UnitX())));
+        // A forearm that bends forward turns about the upper arm's own vertical of the T-pose, in
+        // which the mannequin rests.
         const Eigen::Vector3f upper = direction(joints, kLeftShoulder + side, kLeftElbow + side),
                               fore = direction(joints, kLeftElbow + side, kLeftWrist + side);
-        elbow = std::min(elbow, fore.cross(upper).dot(turned(kLeftShoulder + side, Eigen::Vector3f::UnitY())) * (side == 0 ? 1.0f : -1.0f));
+        elbow = std::min(
+            elbow, fore.cross(upper).dot(turned(kLeftShoulder + side, Eigen::Vector3f::UnitY())) *
+                       (side == 0 ? 1.0f : -1.0f));
       }
     }
     std::printf(
-        "%-12s %3u frames; limbs %.2f, fingers %.2f degrees off; knee %.2f elbow %.2f; soles %.1f mm mean, lowest %.1f mm; step %.1f "
+        "%-12s %3u frames; limbs %.2f, fingers %.2f degrees off; knee %.2f elbow %.2f; soles %.1f "
+        "mm mean, lowest %.1f mm; step %.1f "
         "degrees\n",
-        name.c_str(), clip.frame_count, 57.3 * double{limbs}, 57.3 * double{fingers}, double{knee}, double{elbow},
-        1e3 * double{report.mean_contact_m}, 1e3 * double{report.lowest_sole_m}, 57.3 * double{report.largest_step_rad});
+        name.c_str(), clip.frame_count, 57.3 * double{limbs}, 57.3 * double{fingers}, double{knee},
+        double{elbow}, 1e3 * double{report.mean_contact_m}, 1e3 * double{report.lowest_sole_m},
+        57.3 * double{report.largest_step_rad});
     EXPECT_LT(limbs, 0.01f);
     EXPECT_LT(fingers, 0.01f);
     EXPECT_GT(knee, -0.1f);
@@ -370,11 +431,13 @@ TEST(RetargetGlb, EmotesKeepTheirBonesDirectionsAndTheirHinges) {
 }
 
 TEST(RetargetGlb, EmotesStandUprightAndFaceForward) {
-  ASSERT_EQ(emotes().size(), 16u) << "FIGURINE_EMOTES: run this through scripts/run, after scripts/setup toolchain";
+  ASSERT_EQ(emotes().size(), 16u)
+      << "FIGURINE_EMOTES: run this through scripts/run, after scripts/setup toolchain";
   for (const std::string& path : emotes()) {
     const MotionClip clip = retarget_glb(path, texels().view(), {});
     const Joints joints = joints_at(clip, 0);
-    const Eigen::Vector3f across = direction(joints, kRightShoulder, kLeftShoulder), up = direction(joints, kPelvis, kNeck);
+    const Eigen::Vector3f across = direction(joints, kRightShoulder, kLeftShoulder),
+                          up = direction(joints, kPelvis, kNeck);
     EXPECT_GT(across.cross(up).z(), 0.7f) << path;
     EXPECT_GT(up.y(), 0.9f) << path;
   }

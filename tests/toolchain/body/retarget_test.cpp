@@ -1,4 +1,5 @@
-// Retargeting: a T-pose stays a T-pose, bones keep their direction, the CMU clips walk without broken knees and with feet on the ground.
+// Retargeting: a T-pose stays a T-pose, bones keep their direction, the CMU clips walk without
+// broken knees and with feet on the ground.
 #include "toolchain/body/retarget.h"
 
 #include <Eigen/Geometry>
@@ -36,7 +37,8 @@ const Bvh& clip_0103() {
 Bvh t_pose() {
   Bvh bvh = clip_0103();
   bvh.values.resize(bvh.channel_count);
-  bvh.values.insert(bvh.values.end(), bvh.values.begin(), bvh.values.begin() + static_cast<std::ptrdiff_t>(bvh.channel_count));
+  bvh.values.insert(bvh.values.end(), bvh.values.begin(),
+                    bvh.values.begin() + static_cast<std::ptrdiff_t>(bvh.channel_count));
   bvh.frame_count = 2;
   return bvh;
 }
@@ -51,7 +53,8 @@ TEST(Retarget, TPoseBecomesATPose) {
                                     {kLeftWrist, kLeftMiddle1, 1.0f},
                                     {kRightShoulder, kRightElbow, -1.0f},
                                     {kRightElbow, kRightWrist, -1.0f}}) {
-    EXPECT_GT(direction(joints, from, to).dot(Vec3(x, 0, 0)), 0.996) << int(from);  // the clip's T-pose droops by 5 degrees
+    EXPECT_GT(direction(joints, from, to).dot(Vec3(x, 0, 0)), 0.996)
+        << int(from);  // the clip's T-pose droops by 5 degrees
   }
   // Palms down: the index lies in front of the pinky, and fingers curl downward.
   for (int shift : {0, kRightIndex1 - kLeftIndex1}) {
@@ -66,8 +69,8 @@ TEST(Retarget, TPoseBecomesATPose) {
 }
 
 TEST(Retarget, BonesKeepTheSourcesWorldDirection) {
-  // One elbow of the hierarchy's zero pose bent forward by 40 degrees and the root turned by 90: the forearm points where the source's
-  // points.
+  // One elbow of the hierarchy's zero pose bent forward by 40 degrees and the root turned by 90:
+  // the forearm points where the source's points.
   Bvh bvh = t_pose();
   std::fill(bvh.values.begin(), bvh.values.end(), 0.0f);
   float* frame = bvh.values.data();
@@ -75,12 +78,15 @@ TEST(Retarget, BonesKeepTheSourcesWorldDirection) {
   const BvhJoint& forearm = bvh.joints[static_cast<size_t>(bvh.find("LeftForeArm"))];
   frame[hips.first_channel + 4] = 90;      // Yrotation: +z to +x, +x to -z
   frame[forearm.first_channel + 1] = -40;  // from +x towards +z, before the turn
-  const MotionClip clip = retarget_bvh(bvh, texels().view(), {.frames_per_second = 120, .neutral = Neutral::kZeroPose, .smooth_s = 0});
+  const MotionClip clip =
+      retarget_bvh(bvh, texels().view(),
+                   {.frames_per_second = 120, .neutral = Neutral::kZeroPose, .smooth_s = 0});
   const figurine::Motion motion = clip.view();
   const std::vector<Vec3> joints = joints_of(texels().view(), motion.pose(0));
   const float a = 40 * std::numbers::pi_v<float> / 180;
   EXPECT_GT(direction(joints, kLeftShoulder, kLeftElbow).dot(Vec3(0, 0, -1)), 0.99999);
-  EXPECT_GT(direction(joints, kLeftElbow, kLeftWrist).dot(Vec3(std::sin(a), 0, -std::cos(a))), 0.99999);
+  EXPECT_GT(direction(joints, kLeftElbow, kLeftWrist).dot(Vec3(std::sin(a), 0, -std::cos(a))),
+            0.99999);
 }
 
 struct Walk {
@@ -91,7 +97,8 @@ TEST(Retarget, CmuWalksHaveSoundKneesElbowsAndFeet) {
   // The walking parts of 01_03, frames of the file at 120 a second.
   for (const Walk& walk : {Walk{1, 76}, Walk{1473, 50}, Walk{2241, 55}, Walk{3329, 55}}) {
     RetargetReport report;
-    const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.start = walk.start, .frames = walk.frames}, &report);
+    const MotionClip clip = retarget_bvh(clip_0103(), texels().view(),
+                                         {.start = walk.start, .frames = walk.frames}, &report);
     const figurine::Motion motion = clip.view();
     float knee = 1e9f, elbow = 1e9f, hands = 1e9f;
     for (uint32_t f = 0; f < clip.frame_count; ++f) {
@@ -99,23 +106,29 @@ TEST(Retarget, CmuWalksHaveSoundKneesElbowsAndFeet) {
       const Vec3 left = direction(joints, kRightHip, kLeftHip);
       const Vec3 up = direction(joints, kPelvis, kSpine3), front = left.cross(up);
       for (int side = 0; side < 2; ++side) {
-        // A shin that turns backwards turns about +left from the thigh; an inverted knee would turn the other way.
-        knee = std::min(
-            knee,
-            direction(joints, kLeftHip + side, kLeftKnee + side).cross(direction(joints, kLeftKnee + side, kLeftAnkle + side)).dot(left));
+        // A shin that turns backwards turns about +left from the thigh; an inverted knee would turn
+        // the other way.
+        knee = std::min(knee, direction(joints, kLeftHip + side, kLeftKnee + side)
+                                  .cross(direction(joints, kLeftKnee + side, kLeftAnkle + side))
+                                  .dot(left));
         // Forearms of hanging arms bend to the front of the chest.
         const Vec3 upper_arm = direction(joints, kLeftShoulder + side, kLeftElbow + side);
         const Vec3 forearm = direction(joints, kLeftElbow + side, kLeftWrist + side);
         const Vec3 chest_front = direction(joints, kRightShoulder, kLeftShoulder).cross(up);
-        if (upper_arm.dot(up) < -0.7f) elbow = std::min(elbow, (forearm - upper_arm).dot(chest_front));
+        if (upper_arm.dot(up) < -0.7f)
+          elbow = std::min(elbow, (forearm - upper_arm).dot(chest_front));
         // Wrists stay outside the trunk: an ellipse of 15 x 10 cm around the spine below the chest.
         const Vec3 wrist = joints[static_cast<size_t>(kLeftWrist + side)] - joints[kSpine1];
-        hands = std::min(hands, Eigen::Vector2f(wrist.dot(left) / 0.15f, wrist.dot(front) / 0.10f).norm());
+        hands = std::min(hands,
+                         Eigen::Vector2f(wrist.dot(left) / 0.15f, wrist.dot(front) / 0.10f).norm());
       }
     }
-    std::printf("frames %u + %u: knee %.3f elbow %.3f wrist %.2f; soles %.1f mm mean, lowest %.1f mm; largest step %.1f degrees\n",
-                walk.start, walk.frames, double{knee}, double{elbow}, double{hands}, 1e3 * double{report.mean_contact_m},
-                1e3 * double{report.lowest_sole_m}, 57.3 * double{report.largest_step_rad});
+    std::printf(
+        "frames %u + %u: knee %.3f elbow %.3f wrist %.2f; soles %.1f mm mean, lowest %.1f mm; "
+        "largest step %.1f degrees\n",
+        walk.start, walk.frames, double{knee}, double{elbow}, double{hands},
+        1e3 * double{report.mean_contact_m}, 1e3 * double{report.lowest_sole_m},
+        57.3 * double{report.largest_step_rad});
     EXPECT_GT(knee, -0.03);  // straight legs may read as a degree or two
     EXPECT_GT(elbow, -0.15);
     EXPECT_GT(hands, 1);
@@ -133,7 +146,8 @@ TEST(Retarget, PlantedFeetDoNotSlide) {
              after = joints_of(texels().view(), motion.pose(27))[kRightFoot];
   const Vec3 root_before = joints_of(texels().view(), motion.pose(18))[kPelvis],
              root_after = joints_of(texels().view(), motion.pose(27))[kPelvis];
-  std::printf("stance foot moves %.1f mm while the root moves %.1f mm\n", 1e3 * double{(after - before).norm()},
+  std::printf("stance foot moves %.1f mm while the root moves %.1f mm\n",
+              1e3 * double{(after - before).norm()},
               1e3 * double{(root_after - root_before).norm()});
   EXPECT_LT((after - before).norm(), 0.015);
   EXPECT_GT((root_after - root_before).norm(), 0.15);
@@ -162,16 +176,22 @@ TEST(Retarget, RefusesWhatTheClipDoesNotHave) {
     return test::input_error([&] { retarget_bvh(clip_0103(), texels().view(), options); });
   };
   EXPECT_NE(error({.start = 99999, .name = "x"}).find("01_03.bvh: start 99999"), std::string::npos);
-  EXPECT_NE(error({.frames = 99999, .name = "x"}).find("01_03.bvh: frames 99999: only 1128"), std::string::npos);
+  EXPECT_NE(error({.frames = 99999, .name = "x"}).find("01_03.bvh: frames 99999: only 1128"),
+            std::string::npos);
   Bvh renamed = clip_0103();
   renamed.joints[static_cast<size_t>(renamed.find("LeftFoot"))].name = "l_foot";
-  EXPECT_NE(test::input_error([&] { retarget_bvh(renamed, texels().view(), {}); }).find("no joint LeftFoot"), std::string::npos);
+  EXPECT_NE(test::input_error([&] {
+              retarget_bvh(renamed, texels().view(), {});
+            }).find("no joint LeftFoot"),
+            std::string::npos);
 }
 
 // AMASS-style files of two frames, all joints in the rest pose but the root.
-std::string amass(const test::TemporaryFolder& folder, size_t columns, const std::string& rate_key = "mocap_frame_rate") {
+std::string amass(const test::TemporaryFolder& folder, size_t columns,
+                  const std::string& rate_key = "mocap_frame_rate") {
   std::vector<double> poses(2 * columns, 0.0);
-  for (size_t f = 0; f < 2; ++f) poses[f * columns] = std::numbers::pi / 2;  // z-up data stands by a turn about x
+  for (size_t f = 0; f < 2; ++f)
+    poses[f * columns] = std::numbers::pi / 2;  // z-up data stands by a turn about x
   const std::string path = folder / "amass.npz";
   test::write_npz(path, {{"poses", test::npy_bytes("<f8", {2, columns}, poses)},
                          {"trans", test::npy_bytes("<f8", {2, 3}, {1, 2, 0.9, 1, 1, 0.9})},
@@ -184,8 +204,9 @@ TEST(Retarget, ZeroSmplxPoseIsATPoseOnItsFeet) {
   const test::TemporaryFolder folder;
   for (size_t columns : {165, 156, 66}) {
     RetargetReport report;
-    const MotionClip clip = retarget_npz(amass(folder, columns, columns == 66 ? "mocap_framerate" : "mocap_frame_rate"), texels().view(),
-                                         {.smooth_s = 0}, &report);
+    const MotionClip clip =
+        retarget_npz(amass(folder, columns, columns == 66 ? "mocap_framerate" : "mocap_frame_rate"),
+                     texels().view(), {.smooth_s = 0}, &report);
     ASSERT_EQ(clip.frame_count, 2u);
     const figurine::Motion motion = clip.view();
     const std::vector<Vec3> joints = joints_of(texels().view(), motion.pose(0));
@@ -201,12 +222,19 @@ TEST(Retarget, ZeroSmplxPoseIsATPoseOnItsFeet) {
 
 TEST(Retarget, BadNpzIsOneClearLine) {
   const test::TemporaryFolder folder;
-  EXPECT_NE(test::input_error([&] { retarget_npz(amass(folder, 72), texels().view(), {}); }).find("poses: 72 columns"), std::string::npos);
+  EXPECT_NE(test::input_error([&] {
+              retarget_npz(amass(folder, 72), texels().view(), {});
+            }).find("poses: 72 columns"),
+            std::string::npos);
   const std::string path = folder / "bad.npz";
-  test::write_npz(path, {{"poses", test::npy_bytes("<f8", {1, 66}, std::vector<double>(66, std::nan("")))},
-                         {"trans", test::npy_bytes("<f8", {1, 3}, {0, 0, 0})},
-                         {"mocap_framerate", test::npy_bytes("<f8", {}, {30})}});
-  EXPECT_NE(test::input_error([&] { retarget_npz(path, texels().view(), {}); }).find("poses: a value is not finite"), std::string::npos);
+  test::write_npz(
+      path, {{"poses", test::npy_bytes("<f8", {1, 66}, std::vector<double>(66, std::nan("")))},
+             {"trans", test::npy_bytes("<f8", {1, 3}, {0, 0, 0})},
+             {"mocap_framerate", test::npy_bytes("<f8", {}, {30})}});
+  EXPECT_NE(test::input_error([&] {
+              retarget_npz(path, texels().view(), {});
+            }).find("poses: a value is not finite"),
+            std::string::npos);
 }
 
 float largest_step(const MotionClip& clip, uint32_t from, uint32_t to) {
@@ -238,12 +266,17 @@ TEST(MotionLoop, RepeatsWithoutASeamAndWalksStraight) {
   EXPECT_LT(largest_step(loop, length - 1, length), within);
   EXPECT_LT(largest_step(loop, loop.frame_count - 1, 0), within);
   // Straight along +z at a walking pace, hips swaying.
-  const float pace = (loop.root_translation_m[3 * size_t{length} + 2] - loop.root_translation_m[2]) / (static_cast<float>(length) / 30);
+  const float pace =
+      (loop.root_translation_m[3 * size_t{length} + 2] - loop.root_translation_m[2]) /
+      (static_cast<float>(length) / 30);
   EXPECT_GT(pace, 0.7);
   EXPECT_LT(pace, 1.6);
   for (uint32_t f = 0; f < loop.frame_count; ++f) {
     const float* q = &loop.rotations[size_t{f} * kJointCount * 4];
-    EXPECT_LT(std::abs(std::atan2(2 * (q[1] * q[3] + q[0] * q[2]), 1 - 2 * (q[1] * q[1] + q[2] * q[2]))), 0.2) << f;
+    EXPECT_LT(
+        std::abs(std::atan2(2 * (q[1] * q[3] + q[0] * q[2]), 1 - 2 * (q[1] * q[1] + q[2] * q[2]))),
+        0.2)
+        << f;
     EXPECT_LT(std::abs(loop.root_translation_m[size_t{f} * 3]), 0.08);
   }
 }
@@ -256,8 +289,12 @@ TEST(MotionLoop, InPlaceStaysInPlace) {
       EXPECT_LT(std::abs(loop.root_translation_m[i]), 0.08);
     }
   }
-  const MotionClip short_clip = retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 20, .name = "short"});
-  EXPECT_NE(test::input_error([&] { make_loop(short_clip, {}); }).find("short: loop: 20 frames are too few"), std::string::npos);
+  const MotionClip short_clip =
+      retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 20, .name = "short"});
+  EXPECT_NE(test::input_error([&] {
+              make_loop(short_clip, {});
+            }).find("short: loop: 20 frames are too few"),
+            std::string::npos);
 }
 
 TEST(MotionClip, SurvivesThePackage) {
@@ -270,17 +307,20 @@ TEST(MotionClip, SurvivesThePackage) {
   EXPECT_EQ(back.rotations, clip.rotations);
   EXPECT_EQ(back.root_translation_m, clip.root_translation_m);
   EXPECT_EQ(back.name, "walk");
-  EXPECT_NE(test::input_error([&] { read_motion_clip(folder / "none.fgn"); }).find("none.fgn"), std::string::npos);
+  EXPECT_NE(test::input_error([&] { read_motion_clip(folder / "none.fgn"); }).find("none.fgn"),
+            std::string::npos);
 }
 
 TEST(MotionClip, TurningTurnsAboutTheVerticalThroughTheRoot) {
   const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.frames = 20});
   const OwnedPose pose = clip.pose(13);
   const float angle = 0.7f;
-  const std::vector<Vec3> before = joints_of(texels().view(), pose.view()), after = joints_of(texels().view(), turned(pose, angle).view());
+  const std::vector<Vec3> before = joints_of(texels().view(), pose.view()),
+                          after = joints_of(texels().view(), turned(pose, angle).view());
   float worst = 0;
   for (size_t j = 0; j < kJointCount; ++j) {
-    const Vec3 wanted = before[0] + Eigen::AngleAxisf(angle, Vec3::UnitY()) * (before[j] - before[0]);
+    const Vec3 wanted =
+        before[0] + Eigen::AngleAxisf(angle, Vec3::UnitY()) * (before[j] - before[0]);
     worst = std::max(worst, (after[j] - wanted).norm());
   }
   EXPECT_LT(worst, 1e-5);

@@ -1,4 +1,5 @@
-// The SMPL-X importer on files that the test makes: the keys and shapes of v1.1 and v1.0, none of its data.
+// The SMPL-X importer on files that the test makes: the keys and shapes of v1.1 and v1.0, none of
+// its data.
 #include "toolchain/body/smplx.h"
 
 #include <cmath>
@@ -12,28 +13,35 @@ namespace figurine::body {
 namespace {
 
 constexpr size_t kVertices = 10475, kFaces = 20908, kUvs = 11313;
-constexpr size_t kColumns = 25, kRows = kVertices / kColumns;  // a sheet of 25 x 419 vertices stands in for the body
+constexpr size_t kColumns = 25,
+                 kRows =
+                     kVertices / kColumns;  // a sheet of 25 x 419 vertices stands in for the body
 
 using Arrays = std::map<std::string, std::string>;
 
-// A sheet in the plane z = 0, x in [-0.5, 0.5], y in [-1.2, 0.6]; v_template in metres. Joint j sits at vertex 100 j; vertex v hangs on
-// joint v % 55, half of it on joint 3. Shape direction s moves every vertex along y by 0.01 (s + 1).
+// A sheet in the plane z = 0, x in [-0.5, 0.5], y in [-1.2, 0.6]; v_template in metres. Joint j
+// sits at vertex 100 j; vertex v hangs on joint v % 55, half of it on joint 3. Shape direction s
+// moves every vertex along y by 0.01 (s + 1).
 Arrays arrays(size_t directions, const std::string& real) {
-  std::vector<double> position, uv, faces, shapes, regressor(kJointCount * kVertices, 0.0), weights(kVertices * kJointCount, 0.0);
+  std::vector<double> position, uv, faces, shapes, regressor(kJointCount * kVertices, 0.0),
+      weights(kVertices * kJointCount, 0.0);
   for (size_t v = 0; v < kVertices; ++v) {
-    const double x = static_cast<double>(v % kColumns) / (kColumns - 1), y = static_cast<double>(v / kColumns) / (kRows - 1);
+    const double x = static_cast<double>(v % kColumns) / (kColumns - 1),
+                 y = static_cast<double>(v / kColumns) / (kRows - 1);
     position.insert(position.end(), {x - 0.5, 1.8 * y - 1.2, 0});
     uv.insert(uv.end(), {x, y});
     weights[v * kJointCount + v % kJointCount] += 0.5;
     weights[v * kJointCount + 3] += 0.5;
     for (size_t i = 0; i < 3; ++i) {
-      for (size_t s = 0; s < directions; ++s) shapes.push_back(i == 1 ? 0.01 * static_cast<double>(s + 1) : 0);
+      for (size_t s = 0; s < directions; ++s)
+        shapes.push_back(i == 1 ? 0.01 * static_cast<double>(s + 1) : 0);
     }
   }
   uv.resize(kUvs * 2, 0.0);
   for (size_t row = 0; row + 1 < kRows; ++row) {
     for (size_t column = 0; column + 1 < kColumns; ++column) {
-      const double a = static_cast<double>(row * kColumns + column), b = a + 1, c = a + kColumns, d = c + 1;
+      const double a = static_cast<double>(row * kColumns + column), b = a + 1, c = a + kColumns,
+                   d = c + 1;
       faces.insert(faces.end(), {a, b, d, a, d, c});
     }
   }
@@ -70,7 +78,8 @@ TEST(Smplx, ReadsVersion11) {
   EXPECT_FLOAT_EQ(model.surface.uv[1], 1);
   // Every joint moves with the shape like its vertex.
   for (size_t s = 0; s < 20; ++s)
-    EXPECT_NEAR(model.joint_shape_basis_m[(s * kJointCount + 9) * 3 + 1], 0.01 * static_cast<double>(s + 1), 1e-6);
+    EXPECT_NEAR(model.joint_shape_basis_m[(s * kJointCount + 9) * 3 + 1],
+                0.01 * static_cast<double>(s + 1), 1e-6);
   // Vertex 8 hangs on joints 3 and 8 alike.
   EXPECT_EQ(model.surface.skin_joints[8 * kSkinInfluences], 3);
   EXPECT_EQ(model.surface.skin_joints[8 * kSkinInfluences + 1], 8);
@@ -104,22 +113,30 @@ TEST(Smplx, BadFilesAreOneClearLine) {
   Arrays missing = sound;
   missing.erase("vt");
   EXPECT_NE(error(missing).find("vt: no such array"), std::string::npos);
-  EXPECT_NE(with("weights", test::npy_bytes("<f4", {3, 55}, std::vector<double>(165))).find("weights: shape (3,55), expected (10475,55)"),
+  EXPECT_NE(with("weights", test::npy_bytes("<f4", {3, 55}, std::vector<double>(165)))
+                .find("weights: shape (3,55), expected (10475,55)"),
             std::string::npos);
-  EXPECT_NE(with("v_template", "\x93NUMPY").find("v_template: not a .npy array"), std::string::npos);
-  EXPECT_NE(with("f", test::npy_bytes("<u4", {2, 3}, {0, 1, 2, 0, 1, 99999})).find("ft: shape"), std::string::npos);
+  EXPECT_NE(with("v_template", "\x93NUMPY").find("v_template: not a .npy array"),
+            std::string::npos);
+  EXPECT_NE(with("f", test::npy_bytes("<u4", {2, 3}, {0, 1, 2, 0, 1, 99999})).find("ft: shape"),
+            std::string::npos);
   std::vector<double> tree(110, 0);
-  EXPECT_NE(with("kintree_table", test::npy_bytes("<i8", {2, 55}, tree)).find("kintree_table: joint 1: not the SMPL-X tree"),
+  EXPECT_NE(with("kintree_table", test::npy_bytes("<i8", {2, 55}, tree))
+                .find("kintree_table: joint 1: not the SMPL-X tree"),
             std::string::npos);
   std::vector<double> nan(kUvs * 2, std::nan(""));
-  EXPECT_NE(with("vt", test::npy_bytes("<f4", {kUvs, 2}, nan)).find("vt: value 0"), std::string::npos);
+  EXPECT_NE(with("vt", test::npy_bytes("<f4", {kUvs, 2}, nan)).find("vt: value 0"),
+            std::string::npos);
   // A pickled object array.
   std::string pickled = test::npy_bytes("<f4", {1}, {0});
   pickled.replace(pickled.find("'<f4'"), 5, "'|O' ");
-  EXPECT_NE(with("vt", pickled).find("pickled Python objects, which are never read"), std::string::npos);
+  EXPECT_NE(with("vt", pickled).find("pickled Python objects, which are never read"),
+            std::string::npos);
   test::write_text(path, "not a zip");
-  EXPECT_NE(test::input_error([&] { read_smplx(path); }).find("not a readable .npz"), std::string::npos);
-  EXPECT_NE(test::input_error([&] { read_smplx(folder / "none.npz"); }).find("not a readable .npz"), std::string::npos);
+  EXPECT_NE(test::input_error([&] { read_smplx(path); }).find("not a readable .npz"),
+            std::string::npos);
+  EXPECT_NE(test::input_error([&] { read_smplx(folder / "none.npz"); }).find("not a readable .npz"),
+            std::string::npos);
 }
 
 std::vector<std::byte> bytes_of(const std::string& text) {
@@ -128,7 +145,8 @@ std::vector<std::byte> bytes_of(const std::string& text) {
 }
 
 TEST(Npy, ReadsTypesAndColumnMajorOrder) {
-  EXPECT_EQ(parse_npy(bytes_of(test::npy_bytes("<i8", {2, 2}, {1, -2, 3, 4})), "a").values, (std::vector<double>{1, -2, 3, 4}));
+  EXPECT_EQ(parse_npy(bytes_of(test::npy_bytes("<i8", {2, 2}, {1, -2, 3, 4})), "a").values,
+            (std::vector<double>{1, -2, 3, 4}));
   std::string fortran = test::npy_bytes("<f4", {2, 3}, {1, 4, 2, 5, 3, 6});
   fortran.replace(fortran.find("False"), 5, "True ");
   EXPECT_EQ(parse_npy(bytes_of(fortran), "a").values, (std::vector<double>{1, 2, 3, 4, 5, 6}));
@@ -141,12 +159,14 @@ TEST(Npy, EveryPrefixAndSurplusIsRefused) {
     EXPECT_THROW(parse_npy(bytes_of(sound.substr(0, length)), "a"), InputError) << length;
   }
   EXPECT_THROW(parse_npy(bytes_of(sound + "x"), "a"), InputError);
-  for (const char* shape : {"(99999999999999999999,)", "(4294967296,4294967296,)", "(-1,)", "3", "(", "(2,2,2,2,2,2,2,2,2,)"}) {
+  for (const char* shape : {"(99999999999999999999,)", "(4294967296,4294967296,)", "(-1,)", "3",
+                            "(", "(2,2,2,2,2,2,2,2,2,)"}) {
     std::string changed = sound;
     changed.replace(changed.find("(3,2,)"), 6, shape);
     EXPECT_THROW(parse_npy(bytes_of(changed), "a"), InputError) << shape;
   }
-  // Any single changed byte of the header either still describes the same array or is refused; nothing else happens.
+  // Any single changed byte of the header either still describes the same array or is refused;
+  // nothing else happens.
   for (size_t i = 0; i < 128; ++i) {
     for (int flip : {1, 0x20, 0x80}) {
       std::string changed = sound;

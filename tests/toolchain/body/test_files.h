@@ -18,7 +18,8 @@ namespace figurine::body::test {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "figurine_body_test_XXXXXX").string();
+    std::string name =
+        (std::filesystem::temp_directory_path() / "figurine_body_test_XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
     path_ = name;
   }
@@ -29,20 +30,26 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-inline void write_text(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+inline void write_text(const std::string& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
 
 // One .npy, version 1.0. type: "<f8", "<f4", "<u4", "<i8"; values are row-major.
-inline std::string npy_bytes(const std::string& type, const std::vector<size_t>& shape, const std::vector<double>& values) {
+inline std::string npy_bytes(const std::string& type, const std::vector<size_t>& shape,
+                             const std::vector<double>& values) {
   std::string tuple = "(";
   for (size_t extent : shape) tuple += std::to_string(extent) + ",";
-  std::string header = "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + tuple + "), }";
+  std::string header =
+      "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + tuple + "), }";
   header.resize((header.size() + 1 + 10 + 63) / 64 * 64 - 10, ' ');
   header.back() = '\n';
   std::string out("\x93NUMPY\x01\x00", 8);
   out += static_cast<char>(header.size() & 255);
   out += static_cast<char>(header.size() >> 8);
   out += header;
-  const auto append = [&](auto value) { out.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  const auto append = [&](auto value) {
+    out.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
   for (double value : values) {
     if (type == "<f8") append(value);
     if (type == "<f4") append(static_cast<float>(value));
@@ -61,7 +68,8 @@ inline void write_npz(const std::string& path, const std::map<std::string, std::
     zip_source_t* source = zip_source_buffer(zip, bytes.data(), bytes.size(), 0);
     const zip_int64_t index = zip_file_add(zip, (name + ".npy").c_str(), source, ZIP_FL_ENC_UTF_8);
     ASSERT_GE(index, 0);
-    zip_set_file_compression(zip, static_cast<zip_uint64_t>(index), name.size() % 2 ? ZIP_CM_STORE : ZIP_CM_DEFLATE, 1);
+    zip_set_file_compression(zip, static_cast<zip_uint64_t>(index),
+                             name.size() % 2 ? ZIP_CM_STORE : ZIP_CM_DEFLATE, 1);
   }
   ASSERT_EQ(zip_close(zip), 0);
 }

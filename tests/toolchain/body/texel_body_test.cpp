@@ -1,4 +1,5 @@
-// Texels against closed forms on a square, against brute force on the mannequin, and through the package.
+// Texels against closed forms on a square, against brute force on the mannequin, and through the
+// package.
 #include "toolchain/body/texel_body.h"
 
 #include <cmath>
@@ -13,8 +14,9 @@ namespace {
 
 constexpr uint32_t kSize = 16;
 
-// A square of 1.6 x 0.8 m in the plane z = 0.3 whose chart is the left half of the atlas, u over [0, 0.5], v over [0, 1] downward: the
-// point (x, y) lies at u = x / 3.2, v = 1 - y / 0.8. Joint 1 takes over from joint 0 along x.
+// A square of 1.6 x 0.8 m in the plane z = 0.3 whose chart is the left half of the atlas, u over
+// [0, 0.5], v over [0, 1] downward: the point (x, y) lies at u = x / 3.2, v = 1 - y / 0.8. Joint 1
+// takes over from joint 0 along x.
 BodyModel square() {
   BodyModel model;
   model.name = "square";
@@ -41,9 +43,11 @@ TEST(TexelBody, SquareIsExact) {
   for (size_t row = 0; row < body.texel.size(); ++row) {
     const uint32_t u = body.texel[row] % kSize, v = body.texel[row] / kSize;
     ASSERT_LT(u, kSize / 2);
-    const float x = (static_cast<float>(u) + 0.5f) / kSize * 3.2f, y = 0.8f * (1 - (static_cast<float>(v) + 0.5f) / kSize);
+    const float x = (static_cast<float>(u) + 0.5f) / kSize * 3.2f,
+                y = 0.8f * (1 - (static_cast<float>(v) + 0.5f) / kSize);
     const float wanted[3] = {x, y, 0.3f};
-    for (size_t i = 0; i < 3; ++i) worst = std::max(worst, std::abs(body.position_m[3 * row + i] - wanted[i]));
+    for (size_t i = 0; i < 3; ++i)
+      worst = std::max(worst, std::abs(body.position_m[3 * row + i] - wanted[i]));
     EXPECT_FLOAT_EQ(body.normal[3 * row + 2], 1);
     // Weights go linearly from joint 0 to joint 1.
     for (size_t k = 0; k < 2; ++k) {
@@ -80,20 +84,25 @@ TEST(TexelBody, HiddenTrianglesHaveNoTexels) {
   for (uint32_t t : body.triangle) EXPECT_EQ(t, 0u);
   EXPECT_LT(body.texel.size(), size_t{kSize} * kSize / 2);
   model.surface.hidden = {1, 1};
-  EXPECT_NE(test::input_error([&] { make_texel_body(model, kSize); }).find("no texel"), std::string::npos);
+  EXPECT_NE(test::input_error([&] { make_texel_body(model, kSize); }).find("no texel"),
+            std::string::npos);
 }
 
 TEST(TexelBody, RefusesUvsOutsideTheAtlas) {
   BodyModel model = square();
   model.surface.uv[2] = 1.5f;
-  EXPECT_NE(test::input_error([&] { make_texel_body(model, kSize); }).find("triangle 0 leaves [0,1]"), std::string::npos);
-  EXPECT_NE(test::input_error([&] { make_texel_body(square(), 4); }).find("uv size 4"), std::string::npos);
+  EXPECT_NE(
+      test::input_error([&] { make_texel_body(model, kSize); }).find("triangle 0 leaves [0,1]"),
+      std::string::npos);
+  EXPECT_NE(test::input_error([&] { make_texel_body(square(), 4); }).find("uv size 4"),
+            std::string::npos);
 }
 
 TEST(TexelBody, SpacingIsTheDistanceToNeighbours) {
   const TexelBody body = make_texel_body(make_mannequin(), 128);
   std::vector<int> row_of(128 * 128, -1);
-  for (size_t row = 0; row < body.texel.size(); ++row) row_of[body.texel[row]] = static_cast<int>(row);
+  for (size_t row = 0; row < body.texel.size(); ++row)
+    row_of[body.texel[row]] = static_cast<int>(row);
   double sum = 0;
   int count = 0;
   for (size_t row = 0; row < body.texel.size(); ++row) {
@@ -104,7 +113,9 @@ TEST(TexelBody, SpacingIsTheDistanceToNeighbours) {
     const auto distance = [&](int other) {
       double square_sum = 0;
       for (size_t i = 0; i < 3; ++i)
-        square_sum += std::pow(double{body.position_m[3 * static_cast<size_t>(other) + i]} - body.position_m[3 * row + i], 2);
+        square_sum += std::pow(double{body.position_m[3 * static_cast<size_t>(other) + i]} -
+                                   body.position_m[3 * row + i],
+                               2);
       return std::sqrt(square_sum);
     };
     sum += 0.5 * (distance(right) + distance(below)) / double{body.spacing_m[row]};
@@ -120,13 +131,15 @@ TEST(TexelBody, BorderSourceIsNearestByBruteForce) {
   std::vector<bool> covered(size * size, false), border(size * size, false);
   for (uint32_t t : body.texel) covered[t] = true;
   for (size_t d = 0; d < body.border_texel.size(); ++d) {
-    const int u = static_cast<int>(body.border_texel[d] % size), v = static_cast<int>(body.border_texel[d] / size);
+    const int u = static_cast<int>(body.border_texel[d] % size),
+              v = static_cast<int>(body.border_texel[d] / size);
     ASSERT_FALSE(covered[body.border_texel[d]]);
     border[body.border_texel[d]] = true;
     int best = 1 << 30;
     uint32_t best_row = 0;
     for (uint32_t row = 0; row < body.texel.size(); ++row) {
-      const int du = static_cast<int>(body.texel[row] % size) - u, dv = static_cast<int>(body.texel[row] / size) - v;
+      const int du = static_cast<int>(body.texel[row] % size) - u,
+                dv = static_cast<int>(body.texel[row] / size) - v;
       if (du * du + dv * dv < best) {
         best = du * du + dv * dv;
         best_row = row;
@@ -151,15 +164,18 @@ TEST(TexelBody, SurvivesThePackage) {
   const TexelBody texels = make_texel_body(model, 32);
   const auto bytes = write_package(texels.view(), model.provenance);
   ASSERT_TRUE(bytes.ok()) << bytes.status().message();
-  EXPECT_EQ(*bytes, *write_package(make_texel_body(make_mannequin(), 32).view(), model.provenance));  // the same bytes again
+  EXPECT_EQ(*bytes, *write_package(make_texel_body(make_mannequin(), 32).view(),
+                                   model.provenance));  // the same bytes again
   std::vector<std::byte> room(bytes->size() + 64);
-  auto* aligned = reinterpret_cast<std::byte*>((reinterpret_cast<uintptr_t>(room.data()) + 63) / 64 * 64);
+  auto* aligned =
+      reinterpret_cast<std::byte*>((reinterpret_cast<uintptr_t>(room.data()) + 63) / 64 * 64);
   std::copy(bytes->begin(), bytes->end(), aligned);
   const auto package = Package::open({aligned, bytes->size()}, "mannequin");
   ASSERT_TRUE(package.ok()) << package.status().message();
   EXPECT_EQ(package->body().texel_count(), texels.texel.size());
   EXPECT_EQ(package->body().shape_count(), kMannequinShapeCount);
-  EXPECT_TRUE(std::equal(texels.position_m.begin(), texels.position_m.end(), package->body().texel_position_m.begin()));
+  EXPECT_TRUE(std::equal(texels.position_m.begin(), texels.position_m.end(),
+                         package->body().texel_position_m.begin()));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Whole captures of the mannequin: same bytes for the same seed, readable by the reader, with cameras and poses that agree with the
-// pictures.
+// Whole captures of the mannequin: same bytes for the same seed, readable by the reader, with
+// cameras and poses that agree with the pictures.
 #include "toolchain/capture/capture.h"
 
 #include <cmath>
@@ -42,9 +42,11 @@ const Package& mannequin() {
     const std::string path = folder.path() + "/mannequin.fgn";
     Provenance provenance;
     provenance.tool = "test";
-    throw_if_error(
-        ports::write_file_atomically(path, write_package(body::make_texel_body(body::make_mannequin(), 32).view(), provenance).value()),
-        path);
+    throw_if_error(ports::write_file_atomically(
+                       path, write_package(body::make_texel_body(body::make_mannequin(), 32).view(),
+                                           provenance)
+                                 .value()),
+                   path);
     return ports::MappedFile::open(path).value();
   }();
   static const Package package = Package::open(file.bytes(), "mannequin").value();
@@ -57,10 +59,12 @@ body::MotionClip swinging_clip(uint32_t frames) {
   clip.name = "swinging";
   clip.frame_count = frames;
   for (uint32_t f = 0; f < frames; ++f) {
-    clip.root_translation_m.insert(clip.root_translation_m.end(), {0.01f * static_cast<float>(f), 0, 0});
+    clip.root_translation_m.insert(clip.root_translation_m.end(),
+                                   {0.01f * static_cast<float>(f), 0, 0});
     for (uint32_t j = 0; j < body::kJointCount; ++j) {
       const double angle = 0.25 * std::sin(0.4 * f + 1.7 * j);
-      clip.rotations.insert(clip.rotations.end(), {static_cast<float>(std::cos(angle / 2)), static_cast<float>(std::sin(angle / 2)), 0, 0});
+      clip.rotations.insert(clip.rotations.end(), {static_cast<float>(std::cos(angle / 2)),
+                                                   static_cast<float>(std::sin(angle / 2)), 0, 0});
     }
   }
   return clip;
@@ -84,7 +88,8 @@ std::map<std::string, std::string> all_files(const std::string& directory) {
   for (const auto& entry : fs::recursive_directory_iterator(directory)) {
     if (!entry.is_regular_file()) continue;
     std::ifstream file(entry.path(), std::ios::binary);
-    files[fs::relative(entry.path(), directory).string()] = {std::istreambuf_iterator<char>(file), {}};
+    files[fs::relative(entry.path(), directory).string()] = {std::istreambuf_iterator<char>(file),
+                                                             {}};
   }
   return files;
 }
@@ -125,7 +130,8 @@ TEST(Capture, AnotherSeedIsAnotherPerson) {
   request.seed = 6;
   request.frames = 2;
   capture(request);
-  const dataset::Dataset a = dataset::Dataset::open(finished()), b = dataset::Dataset::open(folder.path() + "/000000");
+  const dataset::Dataset a = dataset::Dataset::open(finished()),
+                         b = dataset::Dataset::open(folder.path() + "/000000");
   EXPECT_NE(a.shape(), b.shape());
   EXPECT_NE(a.load_image(0, 0).rgb, b.load_image(0, 0).rgb);
 }
@@ -133,11 +139,14 @@ TEST(Capture, AnotherSeedIsAnotherPerson) {
 TEST(Capture, ResumedRunEqualsAnUninterruptedOne) {
   const TemporaryFolder folder;
   CaptureRequest request = small_request(folder.path());
-  EXPECT_EQ(capture(request, [](const CaptureProgress& p) { return p.images_done < 17; }), CaptureEnd::kStopped);
+  EXPECT_EQ(capture(request, [](const CaptureProgress& p) { return p.images_done < 17; }),
+            CaptureEnd::kStopped);
   const std::string identity = folder.path() + "/000000";
-  EXPECT_NE(input_error([&] { dataset::Dataset::open(identity); }).find("interrupted"), std::string::npos);
+  EXPECT_NE(input_error([&] { dataset::Dataset::open(identity); }).find("interrupted"),
+            std::string::npos);
   EXPECT_NE(input_error([&] { capture(request); }).find("--resume"), std::string::npos);
-  // What a crash may leave: an empty image and a temporary. The one is made again, the other does not disturb.
+  // What a crash may leave: an empty image and a temporary. The one is made again, the other does
+  // not disturb.
   std::ofstream(identity + "/images_lr/C01/0005_img.jpg", std::ios::trunc);
   request.resume = true;
   EXPECT_EQ(capture(request), CaptureEnd::kComplete);
@@ -163,8 +172,11 @@ TEST(Capture, FoldsFollowThePoseOrNot) {
     request.folds = mode;
     capture(request);
     files[mode] = all_files(folder.path() + "/000000");
-    EXPECT_NE(files[mode]["figurine.json"].find(std::string("\"folds\":\"") + to_string(mode)), std::string::npos);
-    EXPECT_EQ(files[mode]["fmask_lr/C01/0005_img_fmask.png"], files[FoldMode::kPose]["fmask_lr/C01/0005_img_fmask.png"]) << "outlines stay";
+    EXPECT_NE(files[mode]["figurine.json"].find(std::string("\"folds\":\"") + to_string(mode)),
+              std::string::npos);
+    EXPECT_EQ(files[mode]["fmask_lr/C01/0005_img_fmask.png"],
+              files[FoldMode::kPose]["fmask_lr/C01/0005_img_fmask.png"])
+        << "outlines stay";
   }
   const std::string image = "images_lr/C01/0005_img.jpg";
   EXPECT_NE(files[FoldMode::kPose][image], files[FoldMode::kRest][image]);
@@ -179,7 +191,8 @@ TEST(Capture, TheMannequinHasNoWardrobe) {
 }
 
 TEST(Capture, ReaderFindsSplitsAndProvenance) {
-  const dataset::Dataset data = dataset::Dataset::open(finished(), {.body_hash = format_hash(mannequin().content_hash())});
+  const dataset::Dataset data =
+      dataset::Dataset::open(finished(), {.body_hash = format_hash(mannequin().content_hash())});
   EXPECT_EQ(data.frames().size(), 15u);
   EXPECT_EQ(data.cameras().size(), 6u);
   EXPECT_EQ(data.body_name(), "mannequin");
@@ -193,10 +206,14 @@ TEST(Capture, ReaderFindsSplitsAndProvenance) {
   EXPECT_EQ(roles[dataset::Role::kHeldOutPoseBlock], 10);
   EXPECT_EQ(roles[dataset::Role::kHeldOutPoseInterleaved], 5);
   EXPECT_EQ(roles[dataset::Role::kTrain], 60);
-  EXPECT_NE(input_error([] { dataset::Dataset::open(finished(), {.body_hash = std::string(32, '0')}); }).find("body"), std::string::npos);
+  EXPECT_NE(input_error([] {
+              dataset::Dataset::open(finished(), {.body_hash = std::string(32, '0')});
+            }).find("body"),
+            std::string::npos);
 }
 
-// Joints deep inside the body, skinned with the pose that was read and projected with the camera that was read, lie on the mask.
+// Joints deep inside the body, skinned with the pose that was read and projected with the camera
+// that was read, lie on the mask.
 TEST(Capture, JointsProjectInsideTheMask) {
   const dataset::Dataset data = dataset::Dataset::open(finished());
   const Body& body = mannequin().body();
@@ -209,13 +226,16 @@ TEST(Capture, JointsProjectInsideTheMask) {
     for (size_t c = 0; c < data.cameras().size(); ++c) {
       const dataset::CaptureImage image = data.load_image(f, c);
       const Camera& camera = data.cameras()[c].camera;
-      for (uint32_t joint :
-           {body::kPelvis, body::kSpine2, body::kHead, body::kLeftKnee, body::kRightKnee, body::kLeftElbow, body::kRightElbow}) {
-        const std::array<float, 3> p = transform_point(transforms[joint], &joints[size_t{joint} * 3]);
+      for (uint32_t joint : {body::kPelvis, body::kSpine2, body::kHead, body::kLeftKnee,
+                             body::kRightKnee, body::kLeftElbow, body::kRightElbow}) {
+        const std::array<float, 3> p =
+            transform_point(transforms[joint], &joints[size_t{joint} * 3]);
         const auto& m = camera.view_from_world;
         const float z = m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11];
-        const float x = camera.fx_px * (m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3]) / z + camera.cx_px;
-        const float y = camera.fy_px * (m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7]) / z + camera.cy_px;
+        const float x =
+            camera.fx_px * (m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3]) / z + camera.cx_px;
+        const float y =
+            camera.fy_px * (m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7]) / z + camera.cy_px;
         ASSERT_TRUE(x > 0 && x < 96 && y > 0 && y < 80);
         EXPECT_GT(image.alpha[static_cast<size_t>(y) * 96 + static_cast<size_t>(x)], 127)
             << "frame " << f << " camera " << c << " joint " << joint;
@@ -226,21 +246,24 @@ TEST(Capture, JointsProjectInsideTheMask) {
   EXPECT_EQ(checked, 15 * 6 * 7);
 }
 
-// Without figurine.json the same folder is plain MVHumanNet data: the body pose must come out the same, the hands at rest.
+// Without figurine.json the same folder is plain MVHumanNet data: the body pose must come out the
+// same, the hands at rest.
 TEST(Capture, SmplxFilesHoldTheSameBodyPose) {
   const TemporaryFolder folder;
   const std::string copy = folder.path() + "/copy";
   fs::copy(finished(), copy, fs::copy_options::recursive);
   fs::remove(copy + "/figurine.json");
   const Body& body = mannequin().body();
-  const dataset::Dataset full = dataset::Dataset::open(finished()), plain = dataset::Dataset::open(copy, {.body = &body});
+  const dataset::Dataset full = dataset::Dataset::open(finished()),
+                         plain = dataset::Dataset::open(copy, {.body = &body});
   ASSERT_EQ(plain.frames().size(), full.frames().size());
   ASSERT_EQ(plain.cameras().size(), full.cameras().size());
   float worst_rotation = 0, worst_translation = 0;
   for (size_t f = 0; f < full.frames().size(); ++f) {
     const auto &a = full.frames()[f], &b = plain.frames()[f];
     for (int i = 0; i < 3; ++i)
-      worst_translation = std::max(worst_translation, std::fabs(a.root_translation_m[i] - b.root_translation_m[i]));
+      worst_translation =
+          std::max(worst_translation, std::fabs(a.root_translation_m[i] - b.root_translation_m[i]));
     for (uint32_t j = 0; j < 25; ++j) {
       float same = 0;
       for (uint32_t k = 0; k < 4; ++k) same += a.rotations[j * 4 + k] * b.rotations[j * 4 + k];
@@ -251,8 +274,8 @@ TEST(Capture, SmplxFilesHoldTheSameBodyPose) {
   EXPECT_LT(worst_translation, 1e-5f);
   EXPECT_EQ(plain.frames()[0].rotations[25 * 4], 1.0f);
   EXPECT_LT(full.frames()[0].rotations[25 * 4], 1.0f);
-  std::printf("largest difference: rotation %.2g, translation %.2g m\n", static_cast<double>(worst_rotation),
-              static_cast<double>(worst_translation));
+  std::printf("largest difference: rotation %.2g, translation %.2g m\n",
+              static_cast<double>(worst_rotation), static_cast<double>(worst_translation));
 }
 
 TEST(Capture, ImagesAreBlackWhereTheMaskIs) {
@@ -263,7 +286,8 @@ TEST(Capture, ImagesAreBlackWhereTheMaskIs) {
     const size_t x = i % 96, y = i / 96;
     bool empty = true;
     for (size_t v = y / 8 * 8; v < y / 8 * 8 + 8; ++v) {
-      for (size_t u = x / 8 * 8; u < x / 8 * 8 + 8; ++u) empty = empty && image.alpha[v * 96 + u] == 0;
+      for (size_t u = x / 8 * 8; u < x / 8 * 8 + 8; ++u)
+        empty = empty && image.alpha[v * 96 + u] == 0;
     }
     if (!empty) continue;
     ++outside;
@@ -274,8 +298,12 @@ TEST(Capture, ImagesAreBlackWhereTheMaskIs) {
 
 TEST(Capture, DamagedFigurineJsonIsNamed) {
   const std::vector<std::pair<std::string, std::string>> damages = {
-      {"version", "7"}, {"shape", "[null]"}, {"background", "\"green\""}, {"held_out_cameras", "[\"C99\"]"},
-      {"frames", "[]"}, {"body", "{}"}};
+      {"version", "7"},
+      {"shape", "[null]"},
+      {"background", "\"green\""},
+      {"held_out_cameras", "[\"C99\"]"},
+      {"frames", "[]"},
+      {"body", "{}"}};
   for (const auto& [field, value] : damages) {
     const TemporaryFolder folder;
     const std::string copy = folder.path() + "/copy";

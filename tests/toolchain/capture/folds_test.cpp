@@ -1,4 +1,5 @@
-// Strain and folds against shapes that are known in closed form: flat strips that are squeezed, stretched, turned and crumpled.
+// Strain and folds against shapes that are known in closed form: flat strips that are squeezed,
+// stretched, turned and crumpled.
 #include "toolchain/capture/folds.h"
 
 #include <algorithm>
@@ -21,7 +22,8 @@ Mesh sheet(float strength = 1) {
   mesh.name = "sheet";
   for (uint32_t j = 0; j <= kRows; ++j) {
     for (uint32_t i = 0; i <= kColumns; ++i) {
-      mesh.position_m.insert(mesh.position_m.end(), {kStep_m * static_cast<float>(i), 0, -kStep_m * static_cast<float>(j)});
+      mesh.position_m.insert(mesh.position_m.end(), {kStep_m * static_cast<float>(i), 0,
+                                                     -kStep_m * static_cast<float>(j)});
     }
   }
   for (uint32_t j = 0; j < kRows; ++j) {
@@ -34,7 +36,8 @@ Mesh sheet(float strength = 1) {
   mesh.uv_triangles.assign(mesh.triangles.size(), 0);
   mesh.skin_joints.assign(size_t{mesh.vertex_count()} * kSkinInfluences, 0);
   mesh.skin_weights.assign(size_t{mesh.vertex_count()} * kSkinInfluences, 0);
-  for (uint32_t v = 0; v < mesh.vertex_count(); ++v) mesh.skin_weights[size_t{v} * kSkinInfluences] = 1;
+  for (uint32_t v = 0; v < mesh.vertex_count(); ++v)
+    mesh.skin_weights[size_t{v} * kSkinInfluences] = 1;
   mesh.fold_strength.assign(mesh.vertex_count(), strength);
   return mesh;
 }
@@ -63,7 +66,8 @@ float largest_height(const std::vector<FoldSample>& samples) {
 
 TEST(Strain, OfASqueezedStripIsKnown) {
   const Mesh mesh = sheet();
-  for (const Strain& e : StrainGauge(mesh.position_m, mesh.triangles).measure(scaled(mesh, 0.8f, 1.1f))) {
+  for (const Strain& e :
+       StrainGauge(mesh.position_m, mesh.triangles).measure(scaled(mesh, 0.8f, 1.1f))) {
     // Green's strain: (stretch^2 - 1) / 2.
     EXPECT_NEAR(e.xx, (0.64f - 1) / 2, 1e-5f);
     EXPECT_NEAR(e.zz, (1.21f - 1) / 2, 1e-5f);
@@ -90,7 +94,8 @@ TEST(Folds, RigidMotionGivesNone) {
   const FoldPattern pattern(mesh, kStyle, 1);
   EXPECT_GT(pattern.crease_count(), 100u);
   const float c = std::cos(2.0f), s = std::sin(2.0f);
-  const std::vector<float> turned = moved(mesh, [&](Vec3 p) { return Vec3{c * p.x - s * p.y + 3, s * p.x + c * p.y - 1, p.z + 2}; });
+  const std::vector<float> turned = moved(
+      mesh, [&](Vec3 p) { return Vec3{c * p.x - s * p.y + 3, s * p.x + c * p.y - 1, p.z + 2}; });
   EXPECT_LT(largest_height(pattern.evaluate(mesh.position_m)), 1e-9f);
   EXPECT_LT(largest_height(pattern.evaluate(turned)), 2e-5f) << "rounding of positions 3 m away";
 }
@@ -105,13 +110,17 @@ TEST(Folds, PureStretchGivesNone) {
 // What hangs gathers a little even at rest; stretched by more than its slack, it does not.
 TEST(Folds, SlackGathersUprightClothUntilItIsStretched) {
   Mesh mesh = sheet();
-  for (size_t i = 0; i < mesh.position_m.size(); i += 3) std::swap(mesh.position_m[i + 1], mesh.position_m[i + 2]);
+  for (size_t i = 0; i < mesh.position_m.size(); i += 3)
+    std::swap(mesh.position_m[i + 1], mesh.position_m[i + 2]);
   const FoldPattern pattern(mesh, kStyle, 1);
   EXPECT_GT(largest_height(pattern.evaluate(mesh.position_m)), 2e-4f);
-  EXPECT_EQ(largest_height(pattern.evaluate(moved(mesh, [](Vec3 p) { return Vec3{p.x, p.y * 1.05f, p.z}; }))), 0);
+  EXPECT_EQ(largest_height(
+                pattern.evaluate(moved(mesh, [](Vec3 p) { return Vec3{p.x, p.y * 1.05f, p.z}; }))),
+            0);
 }
 
-// A strip squeezed by c keeps its length in folds of mean square slope 2 c (to first order), across the squeeze.
+// A strip squeezed by c keeps its length in folds of mean square slope 2 c (to first order), across
+// the squeeze.
 TEST(Folds, SqueezedStripKeepsItsLengthAcrossTheSqueeze) {
   const Mesh mesh = sheet();
   const FoldPattern pattern(mesh, kStyle, 3);
@@ -128,8 +137,10 @@ TEST(Folds, SqueezedStripKeepsItsLengthAcrossTheSqueeze) {
     }
   }
   const double slope2 = along / static_cast<double>(count);
-  std::printf("mean square slope %.3f along the squeeze, %.3f across it, for a compression of 0.1; mean height %.2f mm\n", slope2,
-              across / static_cast<double>(count), 1e3 * mean / static_cast<double>(count));
+  std::printf(
+      "mean square slope %.3f along the squeeze, %.3f across it, for a compression of 0.1; mean "
+      "height %.2f mm\n",
+      slope2, across / static_cast<double>(count), 1e3 * mean / static_cast<double>(count));
   EXPECT_GT(slope2, 0.2 * 0.4) << "less than half the length is kept";
   EXPECT_LT(slope2, 0.2 * 1.8) << "twice the length is made";
   EXPECT_GT(along, 6 * across);
@@ -140,16 +151,18 @@ TEST(Folds, SmallChangesOfPoseChangeThemLittle) {
   const FoldPattern pattern(mesh, kStyle, 1);
   float worst = 0;
   std::vector<FoldSample> before = pattern.evaluate(mesh.position_m);
-  // From rest through no direction at all (the same squeeze along both) to a squeeze across: nothing may jump on the way.
+  // From rest through no direction at all (the same squeeze along both) to a squeeze across:
+  // nothing may jump on the way.
   for (int i = 1; i <= 80; ++i) {
     const float t = static_cast<float>(i) / 80;
-    const std::vector<FoldSample> now =
-        pattern.evaluate(scaled(mesh, 1 - 0.2f * std::min(1.0f, 2 * t), 1 - 0.3f * std::max(0.0f, 2 * t - 1)));
-    for (size_t k = 0; k < now.size(); ++k) worst = std::max(worst, std::fabs(now[k].height_m - before[k].height_m));
+    const std::vector<FoldSample> now = pattern.evaluate(
+        scaled(mesh, 1 - 0.2f * std::min(1.0f, 2 * t), 1 - 0.3f * std::max(0.0f, 2 * t - 1)));
+    for (size_t k = 0; k < now.size(); ++k)
+      worst = std::max(worst, std::fabs(now[k].height_m - before[k].height_m));
     before = now;
   }
-  std::printf("largest change of height between poses 0.5 %% apart: %.2f mm of %.2f mm\n", 1e3 * static_cast<double>(worst),
-              1e3 * static_cast<double>(largest_height(before)));
+  std::printf("largest change of height between poses 0.5 %% apart: %.2f mm of %.2f mm\n",
+              1e3 * static_cast<double>(worst), 1e3 * static_cast<double>(largest_height(before)));
   EXPECT_LT(worst, 0.0025f);
 }
 
@@ -173,17 +186,21 @@ TEST(Folds, DegenerateFacesAndExtremePosesStayFiniteAndBounded) {
   mesh.triangles.insert(mesh.triangles.end(), {5, 5, 6, 10, 11, 12, 20, 20, 20});
   mesh.uv_triangles.resize(mesh.triangles.size(), 0);
   const FoldPattern pattern(mesh, kStyle, 1);
-  const std::vector<std::vector<float>> poses = {scaled(mesh, 0, 0),
-                                                 scaled(mesh, 0, 1),
-                                                 scaled(mesh, -1, 1),
-                                                 scaled(mesh, 1e-20f, 1e6f),
-                                                 scaled(mesh, 1e19f, 0.5f),
-                                                 moved(mesh, [](Vec3 p) { return Vec3{std::sin(900 * p.x), std::sin(700 * p.z), std::sin(800 * p.x * p.z)}; })};
+  const std::vector<std::vector<float>> poses = {
+      scaled(mesh, 0, 0),
+      scaled(mesh, 0, 1),
+      scaled(mesh, -1, 1),
+      scaled(mesh, 1e-20f, 1e6f),
+      scaled(mesh, 1e19f, 0.5f),
+      moved(mesh, [](Vec3 p) {
+        return Vec3{std::sin(900 * p.x), std::sin(700 * p.z), std::sin(800 * p.x * p.z)};
+      })};
   for (const std::vector<float>& pose : poses) {
     std::vector<FoldSample> samples = pattern.evaluate(pose);
     pattern.turn(samples, std::vector<float>(size_t{mesh.vertex_count()} * 9, 0.0f));
     for (const FoldSample& sample : samples) {
-      ASSERT_TRUE(std::isfinite(sample.height_m) && std::isfinite(dot(sample.gradient, sample.gradient)));
+      ASSERT_TRUE(std::isfinite(sample.height_m) &&
+                  std::isfinite(dot(sample.gradient, sample.gradient)));
       ASSERT_LT(std::fabs(sample.height_m), kStyle.wavelength_m);
     }
   }
@@ -195,10 +212,12 @@ TEST(Folds, SlopesTurnWithTheSurfaceAndAreLimited) {
   const std::vector<FoldSample> rest = pattern.evaluate(scaled(mesh, 0.6f, 1));
   std::vector<FoldSample> turned = rest;
   std::vector<float> linear;
-  for (uint32_t v = 0; v < mesh.vertex_count(); ++v) linear.insert(linear.end(), {0, -1, 0, 1, 0, 0, 0, 0, 1});  // x to y
+  for (uint32_t v = 0; v < mesh.vertex_count(); ++v)
+    linear.insert(linear.end(), {0, -1, 0, 1, 0, 0, 0, 0, 1});  // x to y
   pattern.turn(turned, linear);
   for (size_t i = 0; i < rest.size(); ++i) {
-    const float steep = length(rest[i].gradient), limited = steep / std::sqrt(1 + steep * steep / (1.1f * 1.1f));
+    const float steep = length(rest[i].gradient),
+                limited = steep / std::sqrt(1 + steep * steep / (1.1f * 1.1f));
     ASSERT_NEAR(length(turned[i].gradient), limited, 1e-5f);
     ASSERT_LT(length(turned[i].gradient), 1.1f);
     ASSERT_NEAR(turned[i].gradient.y * steep, rest[i].gradient.x * limited, 1e-4f);
@@ -216,11 +235,13 @@ TEST(ClothStrength, FadesAtBordersAndLeavesSmallPartsAlone) {
   for (float& x : button.position_m) x *= 0.05f;
   for (float s : cloth_strength(button, 0.001f)) EXPECT_EQ(s, 0);
   Mesh glove = mesh;
-  for (size_t v = 0; v < glove.vertex_count(); ++v) glove.skin_joints[v * kSkinInfluences] = body::kLeftWrist;
+  for (size_t v = 0; v < glove.vertex_count(); ++v)
+    glove.skin_joints[v * kSkinInfluences] = body::kLeftWrist;
   for (float s : cloth_strength(glove)) EXPECT_EQ(s, 0);
 }
 
-// The whole way into pixels: a squeezed sheet is shaded in folds, and not with kRest or kOff, which agree on a level sheet.
+// The whole way into pixels: a squeezed sheet is shaded in folds, and not with kRest or kOff, which
+// agree on a level sheet.
 TEST(Folds, ShowInPicturesOfThePoseAlone) {
   Person person;
   person.meshes.push_back(sheet());
@@ -229,7 +250,8 @@ TEST(Folds, ShowInPicturesOfThePoseAlone) {
   std::fill(grey.pixels.begin(), grey.pixels.end(), uint8_t{128});
   mesh.material.colour = std::make_shared<Texture>(grey, TextureEncoding::kColour);
   mesh.folds = std::make_shared<FoldPattern>(mesh, kStyle, 1);
-  Camera camera{.width_px = 48, .height_px = 48, .fx_px = 200, .fy_px = 200, .cx_px = 24, .cy_px = 24};
+  Camera camera{
+      .width_px = 48, .height_px = 48, .fx_px = 200, .fy_px = 200, .cx_px = 24, .cy_px = 24};
   camera.view_from_world = {1, 0, 0, -0.25f, 0, 0, 1, 0.3f, 0, -1, 0, 2};  // from above
   const auto contrast = [&](FoldMode mode, float squeeze) {
     Renderer renderer(person, mode);

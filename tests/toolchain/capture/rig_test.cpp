@@ -53,8 +53,10 @@ body::MotionClip counting_clip(uint32_t frames) {
   clip.name = "counting";
   clip.frame_count = frames;
   for (uint32_t f = 0; f < frames; ++f) {
-    clip.root_translation_m.insert(clip.root_translation_m.end(), {1.0f, 0.001f * static_cast<float>(f), 2.0f});
-    for (uint32_t j = 0; j < dataset::kSmplxJoints; ++j) clip.rotations.insert(clip.rotations.end(), {1, 0, 0, 0});
+    clip.root_translation_m.insert(clip.root_translation_m.end(),
+                                   {1.0f, 0.001f * static_cast<float>(f), 2.0f});
+    for (uint32_t j = 0; j < dataset::kSmplxJoints; ++j)
+      clip.rotations.insert(clip.rotations.end(), {1, 0, 0, 0});
   }
   return clip;
 }
@@ -68,7 +70,9 @@ TEST(Sequence, KeepsTheBlockFarFromEveryOtherPose) {
     ++block;
     for (const CapturedPose& b : sequence) {
       if (b.split != dataset::FrameSplit::kBlock)
-        nearest = std::min(nearest, a.motion_frame > b.motion_frame ? a.motion_frame - b.motion_frame : b.motion_frame - a.motion_frame);
+        nearest =
+            std::min(nearest, a.motion_frame > b.motion_frame ? a.motion_frame - b.motion_frame
+                                                              : b.motion_frame - a.motion_frame);
     }
   }
   EXPECT_EQ(block, 7u);
@@ -79,7 +83,8 @@ TEST(Sequence, KeepsTheBlockFarFromEveryOtherPose) {
 float widest_gap(std::vector<float> headings) {
   std::sort(headings.begin(), headings.end());
   float widest = headings.front() + 6.2831853f - headings.back();
-  for (size_t i = 1; i < headings.size(); ++i) widest = std::max(widest, headings[i] - headings[i - 1]);
+  for (size_t i = 1; i < headings.size(); ++i)
+    widest = std::max(widest, headings[i] - headings[i - 1]);
   return widest;
 }
 
@@ -89,21 +94,26 @@ TEST(Sequence, HeadingsCoverTheCircle) {
     if (pose.split == dataset::FrameSplit::kTrain) training.push_back(pose.heading_rad);
     if (pose.split == dataset::FrameSplit::kInterleaved) held_out.push_back(pose.heading_rad);
   }
-  EXPECT_LT(widest_gap(training), 0.20f) << "104 headings; evenly spread they would be 0.06 rad apart";
+  EXPECT_LT(widest_gap(training), 0.20f)
+      << "104 headings; evenly spread they would be 0.06 rad apart";
   EXPECT_LT(widest_gap(held_out), 1.6f) << "8 headings; evenly spread they would be 0.79 rad apart";
 }
 
 TEST(Sequence, PutsTheRootOverTheOrigin) {
-  for (const CapturedPose& captured : make_sequence({counting_clip(200)}, {.root_rest_m = {0.01f, 0.9f, -0.02f}})) {
+  for (const CapturedPose& captured :
+       make_sequence({counting_clip(200)}, {.root_rest_m = {0.01f, 0.9f, -0.02f}})) {
     EXPECT_EQ(captured.pose.root_translation_m[0], -0.01f);
     EXPECT_EQ(captured.pose.root_translation_m[2], 0.02f);
   }
 }
 
-TEST(Sequence, RefusesMoreFramesThanTheMotionHas) { EXPECT_THROW(make_sequence({counting_clip(50)}, {.frames = 51}), InputError); }
+TEST(Sequence, RefusesMoreFramesThanTheMotionHas) {
+  EXPECT_THROW(make_sequence({counting_clip(50)}, {.frames = 51}), InputError);
+}
 
 TEST(Sequence, LaysMotionsEndToEnd) {
-  const std::vector<CapturedPose> sequence = make_sequence({counting_clip(10), counting_clip(10)}, {.frames = 20});
+  const std::vector<CapturedPose> sequence =
+      make_sequence({counting_clip(10), counting_clip(10)}, {.frames = 20});
   std::set<uint32_t> frames;
   for (size_t i = 0; i < 10; ++i) frames.insert(sequence[i].motion_frame);
   EXPECT_EQ(frames.size(), 10u);

@@ -8,7 +8,8 @@ namespace figurine::capture {
 namespace {
 
 TEST(Texture, SrgbEncodingIsTheInverseOfDecoding) {
-  for (int i = 0; i < 256; ++i) EXPECT_NEAR(255 * srgb_from_linear(linear_from_srgb(static_cast<float>(i) / 255)), i, 1e-3);
+  for (int i = 0; i < 256; ++i)
+    EXPECT_NEAR(255 * srgb_from_linear(linear_from_srgb(static_cast<float>(i) / 255)), i, 1e-3);
 }
 
 TEST(Texture, TexelCentresReturnTheFilesValues) {
@@ -17,7 +18,8 @@ TEST(Texture, TexelCentresReturnTheFilesValues) {
   const Texture texture(image, TextureEncoding::kColour);
   for (uint32_t y = 0; y < 2; ++y) {
     for (uint32_t x = 0; x < 4; ++x) {
-      const Rgba texel = texture.sample((static_cast<float>(x) + 0.5f) / 4, (static_cast<float>(y) + 0.5f) / 2, 0);
+      const Rgba texel =
+          texture.sample((static_cast<float>(x) + 0.5f) / 4, (static_cast<float>(y) + 0.5f) / 2, 0);
       EXPECT_NEAR(texel.colour.y, linear_from_srgb(image.at(x, y)[1] / 255.0f), 1e-6);
       EXPECT_EQ(texel.alpha, 1.0f);
     }
@@ -68,7 +70,8 @@ TEST(Texture, DyeTurnsHuesAndLeavesGreyAlone) {
 TEST(Texture, DyedClothHasTheDyesColourAndItsOwnLightAndDark) {
   ports::ImageU8 image(3, 1, 3);
   image.pixels = {100, 100, 100, 50, 50, 50, 30, 60, 160};
-  dye_region(image, image, {}, {.fibre = Fibre::kNeutral, .dye = {0.8f, 0.4f, 0.2f}, .reference = 100 / 255.0f});
+  dye_region(image, image, {},
+             {.fibre = Fibre::kNeutral, .dye = {0.8f, 0.4f, 0.2f}, .reference = 100 / 255.0f});
   EXPECT_NEAR(image.at(0, 0)[0], 204, 1);
   EXPECT_NEAR(image.at(0, 0)[1], 102, 1);
   EXPECT_NEAR(image.at(0, 0)[2], 51, 1);

@@ -18,7 +18,8 @@ namespace {
 
 std::string directory() {
   const char* environment = std::getenv("FIGURINE_MAKEHUMAN");
-  return environment == nullptr ? "FIGURINE_MAKEHUMAN is not set: run this through scripts/run" : environment;
+  return environment == nullptr ? "FIGURINE_MAKEHUMAN is not set: run this through scripts/run"
+                                : environment;
 }
 
 const body::MakeHuman& makehuman() {
@@ -50,22 +51,26 @@ TEST(Wardrobe, HoldsOnlyWhatHasACc0Counterpart) {
                                          "short03",
                                          "short04"};
   for (bool male : {false, true}) {
-    for (const Garment& garment : garments_for(male)) EXPECT_EQ(allowed.count(garment.name), 1u) << garment.name;
+    for (const Garment& garment : garments_for(male))
+      EXPECT_EQ(allowed.count(garment.name), 1u) << garment.name;
     for (const Hair& hair : hair_for(male)) EXPECT_EQ(allowed.count(hair.name), 1u) << hair.name;
   }
 }
 
-// The emblem's orange and the shirt's blue are far apart: after covering, the region's strongest red must be that of the fabric.
+// The emblem's orange and the shirt's blue are far apart: after covering, the region's strongest
+// red must be that of the fabric.
 TEST(Wardrobe, EmblemsAreCovered) {
   for (bool male : {false, true}) {
     for (const Garment& garment : garments_for(male)) {
       if (garment.cover.empty()) continue;
-      ports::ImageU8 image =
-          read_png(directory() + "/public/data/proxies/clothes/" + garment.name + "/textures/" + garment.name + "_diffuse.png");
+      ports::ImageU8 image = read_png(directory() + "/public/data/proxies/clothes/" + garment.name +
+                                      "/textures/" + garment.name + "_diffuse.png");
       const auto spread = [&](const Region& region) {
         int low = 255, high = -255;
-        for (uint32_t y = static_cast<uint32_t>(region.top * 512) + 8; y + 8 < region.bottom * 512; ++y) {
-          for (uint32_t x = static_cast<uint32_t>(region.left * 512) + 8; x + 8 < region.right * 512; ++x) {
+        for (uint32_t y = static_cast<uint32_t>(region.top * 512) + 8; y + 8 < region.bottom * 512;
+             ++y) {
+          for (uint32_t x = static_cast<uint32_t>(region.left * 512) + 8;
+               x + 8 < region.right * 512; ++x) {
             const uint8_t* p = image.at(x, y);
             low = std::min(low, p[0] - p[2]);
             high = std::max(high, p[0] - p[2]);
@@ -103,18 +108,21 @@ std::string refusal(const WardrobeLimits& limits, const body::MacroShape& shape)
 }
 
 TEST(Wardrobe, ExcludedOutfitsAndSkinsAreNeverWorn) {
-  const WardrobeLimits limits{.excluded_outfits = {"male_worksuit01", "female_sportsuit01"},
-                              .excluded_skins = {"young_darkskinned_male_diffuse", "old_lightskinned_female_diffuse2"}};
+  const WardrobeLimits limits{
+      .excluded_outfits = {"male_worksuit01", "female_sportsuit01"},
+      .excluded_skins = {"young_darkskinned_male_diffuse", "old_lightskinned_female_diffuse2"}};
   int redressed = 0;
   for (uint64_t seed = 0; seed < 300; ++seed) {
     const body::MacroShape shape = body::sample_macro_shape(seed);
     const Outfit free = choose_outfit(seed, shape), limited = choose_outfit(seed, shape, limits);
     for (const std::string& name : limits.excluded_outfits) EXPECT_NE(limited.garment->name, name);
-    for (const std::string& name : limits.excluded_skins) EXPECT_NE(limited.skin_texture, name + ".png");
+    for (const std::string& name : limits.excluded_skins)
+      EXPECT_NE(limited.skin_texture, name + ".png");
     const bool concerned = std::string(free.garment->name).find("worksuit") != std::string::npos ||
                            std::string(free.garment->name).find("sportsuit") != std::string::npos;
     redressed += concerned;
-    EXPECT_TRUE(concerned || free.garment == limited.garment) << "who is not concerned keeps their clothes";
+    EXPECT_TRUE(concerned || free.garment == limited.garment)
+        << "who is not concerned keeps their clothes";
     EXPECT_EQ(free.hair, limited.hair);
     EXPECT_EQ(free.dye[1].x, limited.dye[1].x);
   }
@@ -122,14 +130,16 @@ TEST(Wardrobe, ExcludedOutfitsAndSkinsAreNeverWorn) {
 }
 
 TEST(Wardrobe, OnlyListedOutfitsAndSkinsAreWorn) {
-  const WardrobeLimits limits{.outfits = {"male_worksuit01", "female_sportsuit01"},
-                              .skins = {"young_darkskinned_male_diffuse", "old_lightskinned_female_diffuse2"}};
+  const WardrobeLimits limits{
+      .outfits = {"male_worksuit01", "female_sportsuit01"},
+      .skins = {"young_darkskinned_male_diffuse", "old_lightskinned_female_diffuse2"}};
   for (uint64_t seed = 0; seed < 50; ++seed) {
     const body::MacroShape shape = body::sample_macro_shape(seed);
     const Outfit outfit = choose_outfit(seed, shape, limits);
     const bool male = shape.gender >= 0.5f;
     EXPECT_STREQ(outfit.garment->name, male ? "male_worksuit01" : "female_sportsuit01");
-    EXPECT_EQ(outfit.skin_texture, male ? "young_darkskinned_male_diffuse.png" : "old_lightskinned_female_diffuse2.png");
+    EXPECT_EQ(outfit.skin_texture,
+              male ? "young_darkskinned_male_diffuse.png" : "old_lightskinned_female_diffuse2.png");
     EXPECT_EQ(outfit.skin, male ? "young_african_male" : "old_asian_female");
   }
 }
@@ -137,22 +147,31 @@ TEST(Wardrobe, OnlyListedOutfitsAndSkinsAreWorn) {
 TEST(Wardrobe, LimitsThatLeaveNothingAreNamed) {
   body::MacroShape man = body::sample_macro_shape(7);
   man.gender = 0.9f;
-  EXPECT_NE(refusal({.outfits = {"male_suit99"}}, man).find("--outfit: 'male_suit99'"), std::string::npos);
+  EXPECT_NE(refusal({.outfits = {"male_suit99"}}, man).find("--outfit: 'male_suit99'"),
+            std::string::npos);
   EXPECT_NE(refusal({.skins = {"green"}}, man).find("--skin: 'green'"), std::string::npos);
-  EXPECT_NE(refusal({.excluded_outfits = {"green"}}, man).find("--exclude-outfits: 'green'"), std::string::npos);
-  EXPECT_NE(refusal({.excluded_skins = {"green"}}, man).find("--exclude-skins: 'green'"), std::string::npos);
+  EXPECT_NE(refusal({.excluded_outfits = {"green"}}, man).find("--exclude-outfits: 'green'"),
+            std::string::npos);
+  EXPECT_NE(refusal({.excluded_skins = {"green"}}, man).find("--exclude-skins: 'green'"),
+            std::string::npos);
   EXPECT_NE(refusal({.hair = "bald"}, man).find("--hair: 'bald'"), std::string::npos);
   EXPECT_NE(refusal({.hair = "bob01"}, man).find("--hair: 'bob01'"), std::string::npos);
   EXPECT_NE(refusal({.outfits = {"female_sportsuit01"}}, man).find("--outfit"), std::string::npos);
   WardrobeLimits nothing;
-  for (const Garment& garment : garments_for(true)) nothing.excluded_outfits.push_back(garment.name);
+  for (const Garment& garment : garments_for(true))
+    nothing.excluded_outfits.push_back(garment.name);
   EXPECT_NE(refusal(nothing, man).find("--exclude-outfits: leaves nothing"), std::string::npos);
 }
 
 TEST(Wardrobe, EverySkinIsThere) {
   EXPECT_EQ(skins().size(), 20u);
   for (const Skin& skin : skins()) {
-    EXPECT_EQ(read_png(directory() + "/public/data/skins/" + skin.folder + "/textures/" + skin.texture).width_px % 256, 0u) << skin.texture;
+    EXPECT_EQ(
+        read_png(directory() + "/public/data/skins/" + skin.folder + "/textures/" + skin.texture)
+                .width_px %
+            256,
+        0u)
+        << skin.texture;
   }
 }
 
@@ -163,7 +182,8 @@ TEST(Proxy, EveryGarmentFitsAnyPerson) {
       shape.gender = male ? 0.9f : 0.1f;
       const std::vector<float> vertices = makehuman().vertices(shape);
       for (const Garment& garment : garments_for(male)) {
-        const Mesh mesh = fit_proxy(load_proxy(directory(), "clothes", garment.name), vertices, makehuman());
+        const Mesh mesh =
+            fit_proxy(load_proxy(directory(), "clothes", garment.name), vertices, makehuman());
         ASSERT_GT(mesh.triangle_count(), 500u);
         float lowest = 10, highest = -10, widest = 0;
         for (size_t i = 0; i < mesh.position_m.size(); i += 3) {
@@ -177,7 +197,8 @@ TEST(Proxy, EveryGarmentFitsAnyPerson) {
         EXPECT_LT(widest, 1.0f) << garment.name;
         for (uint32_t v = 0; v < mesh.vertex_count(); ++v) {
           float sum = 0;
-          for (uint32_t k = 0; k < kSkinInfluences; ++k) sum += mesh.skin_weights[size_t{v} * kSkinInfluences + k];
+          for (uint32_t k = 0; k < kSkinInfluences; ++k)
+            sum += mesh.skin_weights[size_t{v} * kSkinInfluences + k];
           ASSERT_NEAR(sum, 1, 1e-5);
         }
       }
@@ -190,7 +211,8 @@ TEST(Person, ShapeCoefficientsDescribeThePersonWithinAMillimetre) {
   const body::TexelBody texels = body::make_texel_body(model, 64);
   double worst = 0;
   for (uint64_t seed : {1u, 2u, 3u}) {
-    const Person person = make_makehuman_person({.seed = seed}, makehuman(), directory(), texels.view());
+    const Person person =
+        make_makehuman_person({.seed = seed}, makehuman(), directory(), texels.view());
     EXPECT_EQ(person.shape.size(), 20u);
     worst = std::max(worst, person.shape_error_m);
     // No skin under the shoes and the shirt, but a face and hands.
@@ -204,7 +226,8 @@ TEST(Person, ShapeCoefficientsDescribeThePersonWithinAMillimetre) {
 }
 
 TEST(Person, RefusesABodyOfOtherTexels) {
-  const body::BodyModel model = body::make_makehuman_model(makehuman(), {.coefficients = 5, .samples = 30});
+  const body::BodyModel model =
+      body::make_makehuman_model(makehuman(), {.coefficients = 5, .samples = 30});
   body::TexelBody texels = body::make_texel_body(model, 32);
   texels.texel[3] += 1;
   try {

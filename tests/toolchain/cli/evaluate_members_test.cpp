@@ -1,5 +1,5 @@
-// figurine-train evaluate members, the way a user runs it: on a population of synthetic avatars a report and pictures; what cannot be
-// measured is one line and no file.
+// figurine-train evaluate members, the way a user runs it: on a population of synthetic avatars a
+// report and pictures; what cannot be measured is one line and no file.
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -19,8 +19,9 @@ using tests::ProgramRun;
 using tests::SyntheticAvatar;
 using tests::TestFolder;
 
-// Members of random weights around common ones; `training` of them train, then one validates and one tests if held_out. With a twin the
-// last held-out member has the first training member's weights.
+// Members of random weights around common ones; `training` of them train, then one validates and
+// one tests if held_out. With a twin the last held-out member has the first training member's
+// weights.
 struct PeopleOptions {
   size_t training = 4;
   bool held_out = true;
@@ -35,14 +36,17 @@ void write_people(const TestFolder& folder, const std::string& name, const Peopl
   const size_t count = options.training + (options.held_out ? 2 : 0);
   for (size_t m = 0; m < count; ++m) {
     const bool twin = options.twin && m + 1 == count;
-    avatars.push_back(
-        make_test_avatar(body, {.shape = {0.1f * float(twin ? 0 : m), 0.2f}, .seed = twin ? 0 : m, .name = "person" + std::to_string(m)}));
+    avatars.push_back(make_test_avatar(body, {.shape = {0.1f * float(twin ? 0 : m), 0.2f},
+                                              .seed = twin ? 0 : m,
+                                              .name = "person" + std::to_string(m)}));
     provenance.push_back(avatars.back().package->provenance());
     provenance.back().quality = {{"psnr_pose_db", 20.0 + double((m * 3) % 5)}};
   }
   NewPopulation population{.name = "people", .initial = initial.package->avatar().network};
   for (size_t m = 0; m < count; ++m) {
-    const Split split = m < options.training ? Split::kTrain : m == options.training ? Split::kValidation : Split::kTest;
+    const Split split = m < options.training    ? Split::kTrain
+                        : m == options.training ? Split::kValidation
+                                                : Split::kTest;
     population.members.push_back({&avatars[m].package->avatar(), &provenance[m], split});
   }
   const auto bytes = write_population(population);
@@ -51,7 +55,8 @@ void write_people(const TestFolder& folder, const std::string& name, const Peopl
 }
 
 ProgramRun members(const TestFolder& folder, const std::string& arguments) {
-  return tests::run_shell(FIGURINE_TRAIN " evaluate members " + arguments + " -o report.json --threads 2", folder);
+  return tests::run_shell(
+      FIGURINE_TRAIN " evaluate members " + arguments + " -o report.json --threads 2", folder);
 }
 
 nlohmann::json report_of(const TestFolder& folder) {
@@ -59,14 +64,17 @@ nlohmann::json report_of(const TestFolder& folder) {
   return nlohmann::json::parse(file);
 }
 
-bool is_jpeg(const TestFolder& folder, const std::string& name) { return folder.has(name) && folder.read(name).substr(0, 2) == "\xff\xd8"; }
+bool is_jpeg(const TestFolder& folder, const std::string& name) {
+  return folder.has(name) && folder.read(name).substr(0, 2) == "\xff\xd8";
+}
 
 TEST(EvaluateMembers, SaysWhatAPopulationIsLike) {
   const TestFolder folder;
   tests::write_test_packages(folder);
   write_people(folder, "six.fgn", {});
-  const ProgramRun run =
-      members(folder, "six.fgn --body body.fgn --ranks 1,2,64 --wall wall.jpg --interpolation strip.jpg --worst 3 --worst-sheet worst.jpg");
+  const ProgramRun run = members(folder,
+                                 "six.fgn --body body.fgn --ranks 1,2,64 --wall wall.jpg "
+                                 "--interpolation strip.jpg --worst 3 --worst-sheet worst.jpg");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const nlohmann::json report = report_of(folder);
   EXPECT_EQ(report.at("members"), nlohmann::json({{"train", 4}, {"validation", 1}, {"test", 1}}));
@@ -76,10 +84,12 @@ TEST(EvaluateMembers, SaysWhatAPopulationIsLike) {
   EXPECT_EQ(report.at("distances").at("correlation").at("training_pairs"), 6);
   EXPECT_EQ(report.at("spectrum").at("whole").at("directions"), 3);
   EXPECT_EQ(report.at("spectrum").at("tokens").size(), 16u);
-  EXPECT_EQ(report.at("span").at("ranks"), nlohmann::json({1, 2, 3})) << "what is beyond N - 1 is N - 1";
+  EXPECT_EQ(report.at("span").at("ranks"), nlohmann::json({1, 2, 3}))
+      << "what is beyond N - 1 is N - 1";
   EXPECT_EQ(report.at("span_db").size(), 3u);
   EXPECT_EQ(report.at("interpolation").at("pairs").at(0).at("steps").size(), 5u);
-  for (const char* picture : {"wall.jpg", "strip.jpg", "worst.jpg"}) EXPECT_TRUE(is_jpeg(folder, picture)) << picture;
+  for (const char* picture : {"wall.jpg", "strip.jpg", "worst.jpg"})
+    EXPECT_TRUE(is_jpeg(folder, picture)) << picture;
 }
 
 TEST(EvaluateMembers, AHeldOutTwinIsInTheSpan) {
@@ -97,7 +107,8 @@ TEST(EvaluateMembers, AHeldOutTwinIsInTheSpan) {
   // The other held-out member is a stranger, so only the spread between the two tells.
   const nlohmann::json& last = report.at("span").at("per_layer").back();
   EXPECT_EQ(last.at("worst_member"), "person4");
-  EXPECT_GT(last.at("variance_kept").get<double>(), report.at("span").at("per_layer").front().at("variance_kept").get<double>());
+  EXPECT_GT(last.at("variance_kept").get<double>(),
+            report.at("span").at("per_layer").front().at("variance_kept").get<double>());
 }
 
 TEST(EvaluateMembers, WithoutHeldOutMembersThereIsNoSpan) {
@@ -117,13 +128,14 @@ TEST(EvaluateMembers, BadInputGivesOneLineAndNothingElse) {
   tests::write_test_packages(folder);
   write_people(folder, "six.fgn", {});
   const std::vector<std::string> before = folder.names();
-  for (const auto& [arguments, wanted] : {std::pair{"none.fgn --body body.fgn", "none.fgn"},
-                                          {"avatar.fgn --body body.fgn", "is a package of kind avatar, not population"},
-                                          {"six.fgn --body avatar.fgn", "is a package of kind avatar, not body"},
-                                          {"six.fgn --body other_body.fgn", "does not fit the body: made for "},
-                                          {"people.fgn --body body.fgn", "has 2 training members, at least 3 are needed"},
-                                          {"six.fgn --body body.fgn --motion body.fgn", "is a package of kind body, not motion"},
-                                          {"six.fgn --body body.fgn --wall wall.png", "--wall: 'wall.png' must end in .jpg"}}) {
+  for (const auto& [arguments, wanted] :
+       {std::pair{"none.fgn --body body.fgn", "none.fgn"},
+        {"avatar.fgn --body body.fgn", "is a package of kind avatar, not population"},
+        {"six.fgn --body avatar.fgn", "is a package of kind avatar, not body"},
+        {"six.fgn --body other_body.fgn", "does not fit the body: made for "},
+        {"people.fgn --body body.fgn", "has 2 training members, at least 3 are needed"},
+        {"six.fgn --body body.fgn --motion body.fgn", "is a package of kind body, not motion"},
+        {"six.fgn --body body.fgn --wall wall.png", "--wall: 'wall.png' must end in .jpg"}}) {
     const ProgramRun run = members(folder, arguments);
     EXPECT_EQ(run.exit_code, 1) << arguments;
     EXPECT_EQ(run.error_lines(), 1u) << run.err;

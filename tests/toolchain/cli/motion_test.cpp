@@ -1,5 +1,5 @@
-// figurine-train motion on .glb clips, the way a user runs it: the emotes become packages that say where they are from; bad files leave
-// nothing.
+// figurine-train motion on .glb clips, the way a user runs it: the emotes become packages that say
+// where they are from; bad files leave nothing.
 #include <cstdlib>
 
 #include "figurine/package.h"
@@ -25,12 +25,15 @@ void write_body(const TestFolder& folder) {
 }
 
 ProgramRun motion(const TestFolder& folder, const std::string& arguments) {
-  return tests::run_shell(FIGURINE_TRAIN " motion " + arguments + " --body body.fgn -o motion.fgn", folder);
+  return tests::run_shell(FIGURINE_TRAIN " motion " + arguments + " --body body.fgn -o motion.fgn",
+                          folder);
 }
 
 std::string emote(const std::string& name) {
   const char* folder = std::getenv("FIGURINE_EMOTES");
-  return std::string(folder == nullptr ? "FIGURINE_EMOTES is not set: run this through scripts/run" : folder) + "/" + name;
+  return std::string(folder == nullptr ? "FIGURINE_EMOTES is not set: run this through scripts/run"
+                                       : folder) +
+         "/" + name;
 }
 
 TEST(MotionCommand, AnEmoteBecomesAPackageThatSaysWhereItIsFrom) {
@@ -45,7 +48,9 @@ TEST(MotionCommand, AnEmoteBecomesAPackageThatSaysWhereItIsFrom) {
   ASSERT_TRUE(package.ok()) << package.status().message();
   EXPECT_EQ(package->motion().name, "walk");
   ASSERT_EQ(package->provenance().sources.size(), 1u);
-  EXPECT_EQ(package->provenance().sources[0], "walk.glb: emotes/walk.glb of the npm package @dcl/wearable-preview 1.28.1, Apache-2.0");
+  EXPECT_EQ(
+      package->provenance().sources[0],
+      "walk.glb: emotes/walk.glb of the npm package @dcl/wearable-preview 1.28.1, Apache-2.0");
 }
 
 TEST(MotionCommand, BadFilesGiveOneLineAndNothingElse) {
@@ -58,7 +63,8 @@ TEST(MotionCommand, BadFilesGiveOneLineAndNothingElse) {
   strange.track(strange.node("tail", -1), "translation", "LINEAR", {0, 1}, {0, 0, 0, 1, 1, 1});
   const auto bytes = ports::MappedFile::open(emote("walk.glb"));
   ASSERT_TRUE(bytes.ok()) << bytes.status().message();
-  const std::string whole(reinterpret_cast<const char*>(bytes->bytes().data()), bytes->bytes().size());
+  const std::string whole(reinterpret_cast<const char*>(bytes->bytes().data()),
+                          bytes->bytes().size());
   folder.write("empty.glb", "");
   folder.write("half.glb", whole.substr(0, whole.size() / 2));
   folder.write("text.glb", "HIERARCHY ROOT Hips");
@@ -67,15 +73,16 @@ TEST(MotionCommand, BadFilesGiveOneLineAndNothingElse) {
   folder.write("walk.glb", whole);
   folder.write("walk.gltf", whole);
   const std::vector<std::string> before = folder.names();
-  for (const auto& [arguments, wanted] : {std::pair{"none.glb", "none.glb"},
-                                          {"empty.glb", "empty.glb: header: the file ends early"},
-                                          {"half.glb", "half.glb: header: length: "},
-                                          {"text.glb", "text.glb: header: magic: not a binary glTF file"},
-                                          {"still.glb", "still.glb: animations: there are none"},
-                                          {"strange.glb", "strange.glb: nodes: no joint has a known name"},
-                                          {"walk.gltf", "walk.gltf: unsupported: a motion is a .bvh, .npz or .glb clip"},
-                                          {"walk.glb --animation 1", "walk.glb: animations: no number 1: there are 1"},
-                                          {"walk.glb --start 500", "walk.glb: start 500: the clip has 32 frames"}}) {
+  for (const auto& [arguments, wanted] :
+       {std::pair{"none.glb", "none.glb"},
+        {"empty.glb", "empty.glb: header: the file ends early"},
+        {"half.glb", "half.glb: header: length: "},
+        {"text.glb", "text.glb: header: magic: not a binary glTF file"},
+        {"still.glb", "still.glb: animations: there are none"},
+        {"strange.glb", "strange.glb: nodes: no joint has a known name"},
+        {"walk.gltf", "walk.gltf: unsupported: a motion is a .bvh, .npz or .glb clip"},
+        {"walk.glb --animation 1", "walk.glb: animations: no number 1: there are 1"},
+        {"walk.glb --start 500", "walk.glb: start 500: the clip has 32 frames"}}) {
     const ProgramRun run = motion(folder, arguments);
     EXPECT_EQ(run.exit_code, 1) << arguments;
     EXPECT_EQ(run.error_lines(), 1u) << run.err;

@@ -1,4 +1,5 @@
-// The reader against a folder of MVHumanNet's layout with all its peculiarities, and against damage.
+// The reader against a folder of MVHumanNet's layout with all its peculiarities, and against
+// damage.
 #include "toolchain/dataset/dataset.h"
 
 #include <algorithm>
@@ -75,7 +76,8 @@ TEST(Dataset, JawAndEyesAreTheLastNineNumbersAndHandsStayAtRest) {
   for (uint32_t joint = 25; joint < 55; ++joint) EXPECT_EQ(q[joint * 4], 1.0f) << joint;
 }
 
-// World point = R(Rh) x + Th for every point of the posed model, the pelvis included: our root translation must bring the same.
+// World point = R(Rh) x + Th for every point of the posed model, the pelvis included: our root
+// translation must bring the same.
 TEST(Dataset, RhAndThTurnAboutTheOriginNotThePelvis) {
   const TemporaryFolder folder;
   const double angle = 0.7;
@@ -91,7 +93,9 @@ TEST(Dataset, RhAndThTurnAboutTheOriginNotThePelvis) {
     const std::array<float, 3> ours = transform_point(transforms[static_cast<size_t>(joint)], p);
     const double expected[3] = {std::cos(angle) * p[0] - std::sin(angle) * p[1] + 0.1,
                                 std::sin(angle) * p[0] + std::cos(angle) * p[1] - 0.2, p[2] + 0.3};
-    for (int i = 0; i < 3; ++i) worst = std::max(worst, static_cast<float>(std::fabs(ours[static_cast<size_t>(i)] - expected[i])));
+    for (int i = 0; i < 3; ++i)
+      worst = std::max(worst,
+                       static_cast<float>(std::fabs(ours[static_cast<size_t>(i)] - expected[i])));
   }
   EXPECT_LT(worst, 1e-6f);
   RecordProperty("largest_error_m", std::to_string(worst));
@@ -107,7 +111,8 @@ TEST(Dataset, PelvisRestPositionFollowsTheShape) {
   const Body body = mannequin().view();
   const float rise = body.joint_shape_basis_m[1];
   ASSERT_GT(rise, 0.01f);
-  const float difference = open(tall.path()).frames()[0].root_translation_m[1] - open(flat.path()).frames()[0].root_translation_m[1];
+  const float difference = open(tall.path()).frames()[0].root_translation_m[1] -
+                           open(flat.path()).frames()[0].root_translation_m[1];
   EXPECT_NEAR(difference, -2 * rise, 1e-5);  // upside down: the pelvis goes from r to -r
 }
 
@@ -124,8 +129,10 @@ TEST(Dataset, MasksTheBackgroundAway) {
 
 TEST(Dataset, ReadsAllWaysToPickleAFloat) {
   const std::string bits("\x40\x00\x00\x00\x00\x00\x00\x00", 8);
-  const std::string protocol4 = std::string("\x80\x04\x95\x0a\x00\x00\x00\x00\x00\x00\x00G", 12) + bits + ".";
-  const std::vector<std::string> pickles = {std::string("F2.0\n."), std::string("G") + bits + ".", test::pickle_of_two(), protocol4};
+  const std::string protocol4 =
+      std::string("\x80\x04\x95\x0a\x00\x00\x00\x00\x00\x00\x00G", 12) + bits + ".";
+  const std::vector<std::string> pickles = {std::string("F2.0\n."), std::string("G") + bits + ".",
+                                            test::pickle_of_two(), protocol4};
   for (const std::string& pickle : pickles) {
     const TemporaryFolder folder;
     write_folder(folder);
@@ -148,7 +155,8 @@ TEST(Dataset, RejectsEveryPrefixOfThePickle) {
   const std::string whole = test::pickle_of_two();
   for (size_t length = 0; length < whole.size(); ++length) {
     write_text(folder / "camera_scale.pkl", whole.substr(0, length));
-    EXPECT_NE(input_error([&] { open(folder.path()); }).find("camera_scale.pkl"), std::string::npos) << length;
+    EXPECT_NE(input_error([&] { open(folder.path()); }).find("camera_scale.pkl"), std::string::npos)
+        << length;
   }
 }
 
@@ -169,39 +177,56 @@ void edit(const std::string& path, const std::string& from, const std::string& t
 TEST(Dataset, DamageIsNamedWithFileAndField) {
   const std::string image = "images_lr/" + test::camera_name(1) + "/0005_img.jpg";
   const std::vector<Damage> damages = {
-      {"not JSON", [](const TemporaryFolder& f) { write_text(f / "camera_extrinsics.json", "{"); }, {"camera_extrinsics.json", "JSON"}},
-      {"missing file", [](const TemporaryFolder& f) { std::filesystem::remove(f / "camera_intrinsics.json"); }, {"camera_intrinsics.json"}},
+      {"not JSON",
+       [](const TemporaryFolder& f) { write_text(f / "camera_extrinsics.json", "{"); },
+       {"camera_extrinsics.json", "JSON"}},
+      {"missing file",
+       [](const TemporaryFolder& f) { std::filesystem::remove(f / "camera_intrinsics.json"); },
+       {"camera_intrinsics.json"}},
       {"missing field",
-       [](const TemporaryFolder& f) { edit(f / "camera_extrinsics.json", "\"rotation\"", "\"rotatoin\""); },
+       [](const TemporaryFolder& f) {
+         edit(f / "camera_extrinsics.json", "\"rotation\"", "\"rotatoin\"");
+       },
        {"rotation", "missing"}},
       {"not a rotation",
        [](const TemporaryFolder& f) { edit(f / "camera_extrinsics.json", "[1,0,0]", "[1,1,0]"); },
        {"camera_extrinsics.json"}},
       {"too few numbers",
-       [](const TemporaryFolder& f) { edit(f / "camera_extrinsics.json", "[0.25,0.5,1.5]", "[0.25,0.5]"); },
+       [](const TemporaryFolder& f) {
+         edit(f / "camera_extrinsics.json", "[0.25,0.5,1.5]", "[0.25,0.5]");
+       },
        {"translation", "expected 3"}},
-      {"not finite", [](const TemporaryFolder& f) { edit(f / "smplx/smpl/000000.json", "0.3", "1e999"); }, {"000000.json"}},
+      {"not finite",
+       [](const TemporaryFolder& f) { edit(f / "smplx/smpl/000000.json", "0.3", "1e999"); },
+       {"000000.json"}},
       {"null number",
        [](const TemporaryFolder& f) { edit(f / "smplx/smpl/000000.json", "0.3", "null"); },
        {"000000.json", "poses", "not a number"}},
       {"intrinsics of another size",
        [](const TemporaryFolder& f) { edit(f / "camera_intrinsics.json", "33.0", "1024.0"); },
        {"camera_intrinsics.json", "principal point"}},
-      {"scale zero", [](const TemporaryFolder& f) { write_text(f / "camera_scale.pkl", "F0.0\n."); }, {"camera_scale.pkl", "positive"}},
+      {"scale zero",
+       [](const TemporaryFolder& f) { write_text(f / "camera_scale.pkl", "F0.0\n."); },
+       {"camera_scale.pkl", "positive"}},
       {"missing image",
-       [&](const TemporaryFolder& f) { std::filesystem::remove(f / ("images_lr/" + test::camera_name(2) + "/0010_img.jpg")); },
+       [&](const TemporaryFolder& f) {
+         std::filesystem::remove(f / ("images_lr/" + test::camera_name(2) + "/0010_img.jpg"));
+       },
        {"0010", "missing"}},
       {"path in a camera's name",
        [](const TemporaryFolder& f) { edit(f / "camera_extrinsics.json", "1_CC", "1_../CC"); },
        {"camera_extrinsics.json", "folder"}},
-      {"empty first image", [&](const TemporaryFolder& f) { write_text(f / image, ""); }, {"0005_img.jpg"}},
+      {"empty first image",
+       [&](const TemporaryFolder& f) { write_text(f / image, ""); },
+       {"0005_img.jpg"}},
   };
   for (const Damage& damage : damages) {
     const TemporaryFolder folder;
     write_folder(folder);
     damage.apply(folder);
     const std::string message = input_error([&] { open(folder.path()); });
-    for (const std::string& word : damage.mentions) EXPECT_NE(message.find(word), std::string::npos) << damage.name << ": " << message;
+    for (const std::string& word : damage.mentions)
+      EXPECT_NE(message.find(word), std::string::npos) << damage.name << ": " << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << damage.name;
   }
 }
@@ -213,7 +238,9 @@ TEST(Dataset, DamagedImagesFailWhenLoaded) {
   const std::string whole = test::read_text(data.image_path(0, 0));
   for (size_t length : {whole.size() / 4, whole.size() / 2, whole.size() - 2}) {
     write_text(data.image_path(0, 0), whole.substr(0, length));
-    EXPECT_NE(input_error([&] { (void)data.load_image(0, 0); }).find("0005_img.jpg"), std::string::npos) << length;
+    EXPECT_NE(input_error([&] { (void)data.load_image(0, 0); }).find("0005_img.jpg"),
+              std::string::npos)
+        << length;
   }
   write_text(data.image_path(0, 0), whole);
   const std::string mask = test::read_text(data.mask_path(0, 0));
@@ -231,7 +258,9 @@ TEST(Dataset, NeedsABodyWhereThereIsNoFigurineJson) {
 
 TEST(DefaultSplit, HoldsOutABlockEveryThirteenthAndFourCameras) {
   const Split split = default_split(119, 24);
-  const auto count = [&](FrameSplit s) { return std::count(split.frames.begin(), split.frames.end(), s); };
+  const auto count = [&](FrameSplit s) {
+    return std::count(split.frames.begin(), split.frames.end(), s);
+  };
   EXPECT_EQ(count(FrameSplit::kTrain), 104);
   EXPECT_EQ(count(FrameSplit::kInterleaved), 8);
   EXPECT_EQ(count(FrameSplit::kBlock), 7);
@@ -244,8 +273,10 @@ TEST(DefaultSplit, AlwaysLeavesSomethingToTrainOn) {
       const Split split = default_split(frames, cameras);
       ASSERT_EQ(split.frames.size(), frames);
       ASSERT_EQ(split.held_out_camera.size(), cameras);
-      ASSERT_GE(2 * std::count(split.frames.begin(), split.frames.end(), FrameSplit::kTrain), frames);
-      ASSERT_GE(2 * std::count(split.held_out_camera.begin(), split.held_out_camera.end(), false), cameras);
+      ASSERT_GE(2 * std::count(split.frames.begin(), split.frames.end(), FrameSplit::kTrain),
+                frames);
+      ASSERT_GE(2 * std::count(split.held_out_camera.begin(), split.held_out_camera.end(), false),
+                cameras);
     }
   }
 }

@@ -26,13 +26,16 @@ TEST(Jpeg, Quality97KeepsMoreThan42Decibels) {
   const ports::ImageU8 back = decode_jpeg(encode_jpeg(image, 97), "memory");
   ASSERT_EQ(back.pixels.size(), image.pixels.size());
   double squares = 0;
-  for (size_t i = 0; i < image.pixels.size(); ++i) squares += (image.pixels[i] - back.pixels[i]) * (image.pixels[i] - back.pixels[i]);
-  const double psnr_db = 10 * std::log10(255.0 * 255 * static_cast<double>(image.pixels.size()) / squares);
+  for (size_t i = 0; i < image.pixels.size(); ++i)
+    squares += (image.pixels[i] - back.pixels[i]) * (image.pixels[i] - back.pixels[i]);
+  const double psnr_db =
+      10 * std::log10(255.0 * 255 * static_cast<double>(image.pixels.size()) / squares);
   EXPECT_GT(psnr_db, 42);
   std::printf("PSNR after quality 97: %.1f dB\n", psnr_db);
 }
 
-// Columns of one luma and two chromas: with chroma at half resolution they would melt into one colour.
+// Columns of one luma and two chromas: with chroma at half resolution they would melt into one
+// colour.
 TEST(Jpeg, ChromaKeepsFullResolution) {
   ports::ImageU8 image(32, 32, 3);
   for (uint32_t y = 0; y < 32; ++y) {
@@ -44,10 +47,13 @@ TEST(Jpeg, ChromaKeepsFullResolution) {
     }
   }
   const ports::ImageU8 back = decode_jpeg(encode_jpeg(image, 97), "memory");
-  for (uint32_t x = 0; x + 1 < 32; x += 2) ASSERT_GT(back.at(x + 1, 16)[0] - back.at(x, 16)[0], 80) << x;
+  for (uint32_t x = 0; x + 1 < 32; x += 2)
+    ASSERT_GT(back.at(x + 1, 16)[0] - back.at(x, 16)[0], 80) << x;
 }
 
-TEST(Jpeg, SameImageSameBytes) { EXPECT_EQ(encode_jpeg(colourful(), 97), encode_jpeg(colourful(), 97)); }
+TEST(Jpeg, SameImageSameBytes) {
+  EXPECT_EQ(encode_jpeg(colourful(), 97), encode_jpeg(colourful(), 97));
+}
 
 TEST(Jpeg, SizeComesFromTheHeader) {
   const ImageSize size = decode_jpeg_size(encode_jpeg(colourful(), 90), "memory");
@@ -58,7 +64,8 @@ TEST(Jpeg, SizeComesFromTheHeader) {
 TEST(Jpeg, EveryPrefixIsDamaged) {
   const std::vector<std::byte> whole = encode_jpeg(colourful(), 60);
   for (size_t length = 0; length < whole.size(); ++length) {
-    const std::string message = test::input_error([&] { decode_jpeg(std::span(whole).first(length), "prefix"); });
+    const std::string message =
+        test::input_error([&] { decode_jpeg(std::span(whole).first(length), "prefix"); });
     ASSERT_EQ(message.rfind("prefix: ", 0), 0u) << length;
   }
 }

@@ -1,4 +1,5 @@
-// A tiny folder in MVHumanNet's layout, made file by file, so that tests can break it one field at a time.
+// A tiny folder in MVHumanNet's layout, made file by file, so that tests can break it one field at
+// a time.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +19,8 @@ namespace figurine::dataset::test {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "figurine_dataset_test_XXXXXX").string();
+    std::string name =
+        (std::filesystem::temp_directory_path() / "figurine_dataset_test_XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
     path_ = name;
   }
@@ -46,7 +48,9 @@ inline void write_bytes(const std::string& path, const std::vector<std::byte>& b
 }
 
 // Protocol 2: the pickle of a float 2.0 is these twelve bytes.
-inline std::string pickle_of_two() { return std::string("\x80\x02G\x40\x00\x00\x00\x00\x00\x00\x00.", 12); }
+inline std::string pickle_of_two() {
+  return std::string("\x80\x02G\x40\x00\x00\x00\x00\x00\x00\x00.", 12);
+}
 
 inline constexpr uint32_t kWidth = 32, kHeight = 24;
 
@@ -79,10 +83,11 @@ inline void write_folder(const TemporaryFolder& folder, const FolderSettings& se
   using nlohmann::json;
   json extrinsics = json::object();
   for (uint32_t camera : settings.cameras) {
-    extrinsics[std::to_string(camera) + "_" + camera_name(camera) + ".png"] = {{"focal_length", 80.0},
-                                                                               {"image_center", {32.0, 24.0}},
-                                                                               {"rotation", {{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
-                                                                               {"translation", {0.25, 0.5, 1.5}}};
+    extrinsics[std::to_string(camera) + "_" + camera_name(camera) + ".png"] = {
+        {"focal_length", 80.0},
+        {"image_center", {32.0, 24.0}},
+        {"rotation", {{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
+        {"translation", {0.25, 0.5, 1.5}}};
     for (uint32_t frame : settings.frames) {
       char number[16];
       std::snprintf(number, sizeof number, "%04u", frame);
@@ -96,7 +101,9 @@ inline void write_folder(const TemporaryFolder& folder, const FolderSettings& se
   }
   write_text(folder / "camera_extrinsics.json", extrinsics.dump());
   write_text(folder / "camera_intrinsics.json",
-             json{{"intrinsics", {{80.0, 0.0, 33.0}, {0.0, 82.0, 25.0}, {0.0, 0.0, 1.0}}}, {"dist", json::array()}}.dump());
+             json{{"intrinsics", {{80.0, 0.0, 33.0}, {0.0, 82.0, 25.0}, {0.0, 0.0, 1.0}}},
+                  {"dist", json::array()}}
+                 .dump());
   write_text(folder / "camera_scale.pkl", pickle_of_two());
   for (uint32_t pose : settings.poses) {
     char number[16];
@@ -110,7 +117,8 @@ inline void write_folder(const TemporaryFolder& folder, const FolderSettings& se
                          {"poses", {poses}},
                          {"expression", {std::vector<double>(10, 0.0)}},
                          {"shapes", {settings.shapes}}};
-    write_text(folder / (std::string("smplx/smpl/") + number + ".json"), json::array({person}).dump());
+    write_text(folder / (std::string("smplx/smpl/") + number + ".json"),
+               json::array({person}).dump());
   }
 }
 

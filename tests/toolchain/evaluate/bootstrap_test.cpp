@@ -1,4 +1,5 @@
-// Bootstrap intervals against the closed form for a mean, and how often they hold the truth for statistics of nearest neighbours.
+// Bootstrap intervals against the closed form for a mean, and how often they hold the truth for
+// statistics of nearest neighbours.
 #include "toolchain/evaluate/bootstrap.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,8 @@ TEST(Bootstrap, OfAMeanIsItsStandardError) {
     for (const size_t i : items.references) sum += values(Eigen::Index(i), 0);
     return sum / double(items.references.size());
   };
-  const BootstrapInterval interval = bootstrap_interval(3, 200, mean, {.replicates = 20'000, .centred = false, .seed = 4});
+  const BootstrapInterval interval =
+      bootstrap_interval(3, 200, mean, {.replicates = 20'000, .centred = false, .seed = 4});
   const double average = values.mean();
   const double error = std::sqrt((values.array() - average).square().mean() / 200);
   EXPECT_DOUBLE_EQ(interval.estimate, average);
@@ -29,7 +31,8 @@ TEST(Bootstrap, OfAMeanIsItsStandardError) {
   EXPECT_NEAR((interval.low - average) / error, -1.96, 0.08);
   EXPECT_NEAR((interval.high - average) / error, 1.96, 0.08);
   EXPECT_EQ(interval.replicates, 20'000u);
-  const BootstrapInterval narrow = bootstrap_interval(3, 200, mean, {.replicates = 20'000, .confidence = 0.5, .centred = false, .seed = 4});
+  const BootstrapInterval narrow = bootstrap_interval(
+      3, 200, mean, {.replicates = 20'000, .confidence = 0.5, .centred = false, .seed = 4});
   EXPECT_NEAR((narrow.high - average) / error, 0.674, 0.04);
 }
 
@@ -51,14 +54,16 @@ TEST(Bootstrap, ResamplesBothSetsFromTheSeedAlone) {
     for (const size_t s : items.samples) EXPECT_LT(s, 5u);
     for (const size_t r : items.references) EXPECT_LT(r, 7u);
   }
-  EXPECT_EQ(seen[0].samples, again[0].samples) << "replicate i does not depend on how many there are";
+  EXPECT_EQ(seen[0].samples, again[0].samples)
+      << "replicate i does not depend on how many there are";
   EXPECT_EQ(seen[1].references, again[1].references);
   EXPECT_NE(seen[0].references, seen[1].references);
   EXPECT_NE(seen[0].references, other[0].references);
   std::vector<Items> alike;
   bootstrap_interval(7, 7, remember(alike), {.replicates = 1});
   EXPECT_NE(alike[0].samples, alike[0].references);
-  EXPECT_EQ(seen[3].samples, (std::vector<size_t>{0, 1, 2, 3, 4})) << "the estimate: all items once";
+  EXPECT_EQ(seen[3].samples, (std::vector<size_t>{0, 1, 2, 3, 4}))
+      << "the estimate: all items once";
 }
 
 TEST(Bootstrap, LeavesOutWhatIsNotFinite) {
@@ -68,7 +73,8 @@ TEST(Bootstrap, LeavesOutWhatIsNotFinite) {
   EXPECT_EQ(interval.replicates, 5u);
   EXPECT_EQ(interval.estimate, 3);
   EXPECT_EQ(interval.low, 3);
-  const BootstrapInterval nothing = bootstrap_interval(2, 2, [](const Items&) { return INFINITY; }, {.replicates = 5});
+  const BootstrapInterval nothing =
+      bootstrap_interval(2, 2, [](const Items&) { return INFINITY; }, {.replicates = 5});
   EXPECT_EQ(nothing.replicates, 0u);
   EXPECT_TRUE(std::isnan(nothing.low));
 }
@@ -91,12 +97,15 @@ TEST(Bootstrap, CentredIntervalsHoldWhatPlainOnesMiss) {
   constexpr size_t kItems = 20, kTrials = 200, kTruthTrials = 2000;
   // Samples a little narrower than references, in three dimensions.
   const auto comparison = [&](uint64_t trial) {
-    const RowMatrix samples = 0.7 * tests::random_rows(kItems, 3, 2 * trial), references = tests::random_rows(kItems, 3, 2 * trial + 1);
-    return SampleComparison(
-        {rms_distances(samples, references, 1), rms_distances(samples, samples, 1), rms_distances(references, references, 1)});
+    const RowMatrix samples = 0.7 * tests::random_rows(kItems, 3, 2 * trial),
+                    references = tests::random_rows(kItems, 3, 2 * trial + 1);
+    return SampleComparison({rms_distances(samples, references, 1),
+                             rms_distances(samples, samples, 1),
+                             rms_distances(references, references, 1)});
   };
   using Statistic = double (SampleComparison::*)(const Items&) const;
-  const Statistic statistics[] = {&SampleComparison::mmd, &SampleComparison::coverage_percent, &SampleComparison::one_nna_percent};
+  const Statistic statistics[] = {&SampleComparison::mmd, &SampleComparison::coverage_percent,
+                                  &SampleComparison::one_nna_percent};
   const char* names[] = {"MMD", "COV", "1-NNA"};
   double truth[3] = {};
   Coverage coverage[3];
@@ -108,7 +117,8 @@ TEST(Bootstrap, CentredIntervalsHoldWhatPlainOnesMiss) {
     const SampleComparison sets = comparison(trial);
     for (int k = 0; k < 3; ++k) {
       const auto statistic = [&](const Items& items) { return (sets.*statistics[k])(items); };
-      const BootstrapInterval centred = bootstrap_interval(kItems, kItems, statistic, {.replicates = 200, .seed = trial});
+      const BootstrapInterval centred =
+          bootstrap_interval(kItems, kItems, statistic, {.replicates = 200, .seed = trial});
       const double low = centred.low + centred.bias, high = centred.high + centred.bias;
       if (centred.low <= truth[k] && truth[k] <= centred.high) ++coverage[k].centred;
       if (low <= truth[k] && truth[k] <= high) ++coverage[k].plain;
@@ -118,13 +128,15 @@ TEST(Bootstrap, CentredIntervalsHoldWhatPlainOnesMiss) {
   }
   for (int k = 0; k < 3; ++k) {
     std::printf(
-        "%s: mean %.4g, bias of the replicates %+.3g, their deviation %.3g; 95 %% intervals hold the mean in %.1f %% (plain), %.1f %% "
+        "%s: mean %.4g, bias of the replicates %+.3g, their deviation %.3g; 95 %% intervals hold "
+        "the mean in %.1f %% (plain), %.1f %% "
         "(centred)\n",
-        names[k], truth[k], coverage[k].bias, coverage[k].deviation, 100.0 * double(coverage[k].plain) / kTrials,
-        100.0 * double(coverage[k].centred) / kTrials);
+        names[k], truth[k], coverage[k].bias, coverage[k].deviation,
+        100.0 * double(coverage[k].plain) / kTrials, 100.0 * double(coverage[k].centred) / kTrials);
     EXPECT_GE(double(coverage[k].centred) / kTrials, 0.9) << names[k];
   }
-  EXPECT_GT(coverage[0].bias, 0.5 * coverage[0].deviation) << "fewer different samples are farther away";
+  EXPECT_GT(coverage[0].bias, 0.5 * coverage[0].deviation)
+      << "fewer different samples are farther away";
   EXPECT_LT(coverage[0].plain, coverage[0].centred);
 }
 

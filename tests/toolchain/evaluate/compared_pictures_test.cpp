@@ -15,11 +15,13 @@ namespace {
 // Values in [0,1] as pictures of 8 bits have them.
 PictureRows pictures(Eigen::Index items, Eigen::Index values, uint64_t seed) {
   const RowMatrix normal = tests::random_rows(items, values, seed);
-  return normal.unaryExpr([](double x) { return float(std::lround(255 / (1 + std::exp(-x)))) / 255; });
+  return normal.unaryExpr(
+      [](double x) { return float(std::lround(255 / (1 + std::exp(-x)))) / 255; });
 }
 
 TEST(ComparedPictures, PoolBeforeTheLogarithm) {
-  // Two items of two pictures of two values: errors 1 and 0 pool to 1/2, not to the mean of 0 dB and infinity.
+  // Two items of two pictures of two values: errors 1 and 0 pool to 1/2, not to the mean of 0 dB
+  // and infinity.
   PictureRows a(1, 4), b(2, 4);
   a << 0, 0, 0.5f, 0.5f;
   b << 1, 1, 0.5f, 0.5f,  //
@@ -40,7 +42,8 @@ TEST(ComparedPictures, EqualBruteForce) {
   for (Eigen::Index i = 0; i < a.rows(); ++i) {
     for (Eigen::Index j = 0; j < b.rows(); ++j) {
       long double sum = 0;
-      for (Eigen::Index p = 0; p < a.cols(); ++p) sum += ((long double)a(i, p) - b(j, p)) * ((long double)a(i, p) - b(j, p));
+      for (Eigen::Index p = 0; p < a.cols(); ++p)
+        sum += ((long double)a(i, p) - b(j, p)) * ((long double)a(i, p) - b(j, p));
       error.add(double(mse(i, j) / (sum / a.cols()) - 1));
     }
   }

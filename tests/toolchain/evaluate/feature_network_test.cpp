@@ -1,5 +1,6 @@
-// figurine-features as a way to compare pictures: a distance that behaves like one and grows with damage, numbers that do not depend on who
-// computes them, a file that is read back to the bit and refused where it is unsound.
+// figurine-features as a way to compare pictures: a distance that behaves like one and grows with
+// damage, numbers that do not depend on who computes them, a file that is read back to the bit and
+// refused where it is unsound.
 #include "toolchain/evaluate/feature_network.h"
 
 #include <gtest/gtest.h>
@@ -22,13 +23,15 @@ using test::rectangles;
 
 std::vector<LayerWeights> equal_weights() {
   std::vector<LayerWeights> weights;
-  for (const FeatureStage& stage : kFeatureStages) weights.push_back({torch::full({stage.out}, 0.25f), 0.75});
+  for (const FeatureStage& stage : kFeatureStages)
+    weights.push_back({torch::full({stage.out}, 0.25f), 0.75});
   return weights;
 }
 
 // Not trained: what follows is the arithmetic's doing.
 FigurineFeatures make_network(uint64_t seed = 1) {
-  return FigurineFeatures(initial_feature_weights(seed), equal_weights(), {{"population", "nobody"}});
+  return FigurineFeatures(initial_feature_weights(seed), equal_weights(),
+                          {{"population", "nobody"}});
 }
 
 TEST(RgbPictures, ArePremultipliedColoursOverMidGrey) {
@@ -52,15 +55,18 @@ TEST(FigurineFeatures, IsSmallEnoughToBeCommitted) {
 
 TEST(FigurineFeatures, FeaturesHaveOneLengthAndTellPicturesApart) {
   const RowMatrix features = make_network().features(rectangles(128, 128, 3, 1));
-  for (Eigen::Index i = 0; i < features.rows(); ++i) EXPECT_NEAR(features.row(i).squaredNorm(), 32, 1e-4);
+  for (Eigen::Index i = 0; i < features.rows(); ++i)
+    EXPECT_NEAR(features.row(i).squaredNorm(), 32, 1e-4);
   EXPECT_GT((features.row(0) - features.row(1)).norm(), 1e-3);
 }
 
-// Memory as a process has it after some work: freed blocks of all sizes that the network's copies have, full of NaN.
+// Memory as a process has it after some work: freed blocks of all sizes that the network's copies
+// have, full of NaN.
 void leave_nan_behind() {
   std::vector<torch::Tensor> blocks;
   for (const int64_t channels : {3, 16, 24, 32, 48, 64, 72, 80, 96}) {
-    for (const int64_t values : {1, 25 * 16, 9 * 24, 9 * 48, 9 * 80, 9 * 96, 64, 256, 1024, 4096, 8 * 64, 8 * 256, 8 * 1024, 8 * 4096}) {
+    for (const int64_t values : {1, 25 * 16, 9 * 24, 9 * 48, 9 * 80, 9 * 96, 64, 256, 1024, 4096,
+                                 8 * 64, 8 * 256, 8 * 1024, 8 * 4096}) {
       for (int copy = 0; copy < 3; ++copy) blocks.push_back(torch::full({channels * values}, NAN));
     }
   }
@@ -71,7 +77,8 @@ TEST(FigurineFeatures, DoNotDependOnWhatMemoryHeldBefore) {
                       pictures = torch::full({8, 3, kFeatureSide_px, kFeatureSide_px}, 0.25);
   const auto run = [&] {
     const FeatureOutput output = run_feature_network(weights, pictures);
-    return std::pair{output.features.detach(), torch::autograd::grad({output.features.sum()}, {weights})[0]};
+    return std::pair{output.features.detach(),
+                     torch::autograd::grad({output.features.sum()}, {weights})[0]};
   };
   const auto [features, gradient] = run();
   ASSERT_TRUE(features.isfinite().all().item<bool>() && gradient.isfinite().all().item<bool>());
@@ -119,26 +126,31 @@ TEST(FigurineFeatures, DistanceGrowsWithBlurAndNoise) {
   }
 }
 
-// By hand: two layers' worth of arithmetic is LPIPS' own test (user_networks_test.cpp); here that the distance is made of the stages.
+// By hand: two layers' worth of arithmetic is LPIPS' own test (user_networks_test.cpp); here that
+// the distance is made of the stages.
 TEST(FigurineFeatures, DistanceIsThatOfTheStages) {
   const FigurineFeatures network = make_network();
   const RgbPictures pictures = rectangles(128, 128, 2, 4);
   const torch::NoGradGuard no_gradient;
   std::vector<torch::Tensor> layers[2];
   for (size_t i = 0; i < 2; ++i) {
-    layers[i] = run_feature_network(initial_feature_weights(1), prepare_for_features(pictures[i])).activations;
+    layers[i] = run_feature_network(initial_feature_weights(1), prepare_for_features(pictures[i]))
+                    .activations;
   }
   double expected = 0;
   for (size_t l = 0; l < kFeatureLayers; ++l) {
-    const torch::Tensor a = layers[0][l].to(torch::kFloat64).contiguous(), b = layers[1][l].to(torch::kFloat64).contiguous();
+    const torch::Tensor a = layers[0][l].to(torch::kFloat64).contiguous(),
+                        b = layers[1][l].to(torch::kFloat64).contiguous();
     const int64_t channels = a.size(1), positions = a.size(2) * a.size(3);
     const double *x = a.data_ptr<double>(), *y = b.data_ptr<double>();
     for (int64_t p = 0; p < positions; ++p) {
       double xx = 0, yy = 0;
       for (int64_t c = 0; c < channels; ++c)
-        xx += x[c * positions + p] * x[c * positions + p], yy += y[c * positions + p] * y[c * positions + p];
+        xx += x[c * positions + p] * x[c * positions + p],
+            yy += y[c * positions + p] * y[c * positions + p];
       for (int64_t c = 0; c < channels; ++c) {
-        const double d = x[c * positions + p] / (std::sqrt(xx) + 0.75) - y[c * positions + p] / (std::sqrt(yy) + 0.75);
+        const double d = x[c * positions + p] / (std::sqrt(xx) + 0.75) -
+                         y[c * positions + p] / (std::sqrt(yy) + 0.75);
         expected += 0.25 * d * d / static_cast<double>(positions);
       }
     }
@@ -159,7 +171,8 @@ TEST(FigurineFeatures, NumbersDoNotDependOnThreadsOrCompany) {
   }
   for (size_t i = 0; i < pictures.size(); ++i) {
     const RgbView view = pictures[i];
-    const RgbPictures alone{view.width_px, view.height_px, {view.values.begin(), view.values.end()}};
+    const RgbPictures alone{
+        view.width_px, view.height_px, {view.values.begin(), view.values.end()}};
     EXPECT_EQ(network.features(alone, 2), one.row(Eigen::Index(i))) << "in a batch of its own";
   }
 }
@@ -171,7 +184,8 @@ std::vector<double> shrunk_line(const std::vector<double>& line, size_t count) {
   for (size_t i = 0; i < count; ++i) {
     double sum = 0, weights = 0;
     for (size_t j = 0; j < line.size(); ++j) {
-      const double weight = std::max(0.0, 1 - std::abs((static_cast<double>(j) + 0.5) / ratio - (static_cast<double>(i) + 0.5)));
+      const double weight = std::max(0.0, 1 - std::abs((static_cast<double>(j) + 0.5) / ratio -
+                                                       (static_cast<double>(i) + 0.5)));
       sum += weight * line[j], weights += weight;
     }
     out.push_back(sum / weights);
@@ -188,7 +202,8 @@ TEST(FigurineFeatures, ShrinksLargePicturesByATriangle) {
     ASSERT_EQ(found.sizes(), at::IntArrayRef({1, 3, kFeatureSide_px, kFeatureSide_px}));
     const float* values = found.data_ptr<float>();
     for (size_t c = 0; c < 3; ++c) {
-      std::vector<std::vector<double>> narrow;  // rows of the large picture, columns of the small one
+      std::vector<std::vector<double>>
+          narrow;  // rows of the large picture, columns of the small one
       for (size_t y = 0; y < side; ++y) {
         const auto row = large.values.begin() + static_cast<std::ptrdiff_t>((c * side + y) * side);
         narrow.push_back(shrunk_line({row, row + side}, kSide));
@@ -197,7 +212,8 @@ TEST(FigurineFeatures, ShrinksLargePicturesByATriangle) {
         std::vector<double> column;
         for (const std::vector<double>& row : narrow) column.push_back(row[x]);
         const std::vector<double> expected = shrunk_line(column, kSide);
-        for (size_t y = 0; y < kSide; ++y) worst = std::max(worst, std::abs(expected[y] - values[(c * kSide + y) * kSide + x]));
+        for (size_t y = 0; y < kSide; ++y)
+          worst = std::max(worst, std::abs(expected[y] - values[(c * kSide + y) * kSide + x]));
       }
     }
   }
@@ -206,7 +222,8 @@ TEST(FigurineFeatures, ShrinksLargePicturesByATriangle) {
 }
 
 TEST(FigurineFeatures, RefusesOblongPictures) {
-  const std::string message = input_error([&] { make_network().features(rectangles(128, 96, 1, 1)); });
+  const std::string message =
+      input_error([&] { make_network().features(rectangles(128, 96, 1, 1)); });
   EXPECT_NE(message.find("must be square, not 128x96"), std::string::npos) << message;
 }
 
@@ -235,18 +252,27 @@ TEST(FigurineFeatures, RefusesUnsoundFiles) {
     EXPECT_TRUE(message.starts_with(path + ": ") && test::is_one_line(message)) << message;
     return message;
   };
-  EXPECT_NE(refusal([](auto& file) { file.metadata["format"] = "other"; }).find("format: is no file of figurine-train features"),
+  EXPECT_NE(refusal([](auto& file) {
+              file.metadata["format"] = "other";
+            }).find("format: is no file of figurine-train features"),
             std::string::npos);
-  EXPECT_NE(refusal([](auto& file) { file.tensors.erase("stage.2.bias"); }).find("stage.2.bias: missing"), std::string::npos);
-  EXPECT_NE(refusal([](auto& file) { file.tensors["embedding.bias"] = {{3}, {1, 2, 3}}; }).find("embedding.bias: is of another shape"),
+  EXPECT_NE(
+      refusal([](auto& file) { file.tensors.erase("stage.2.bias"); }).find("stage.2.bias: missing"),
+      std::string::npos);
+  EXPECT_NE(refusal([](auto& file) {
+              file.tensors["embedding.bias"] = {{3}, {1, 2, 3}};
+            }).find("embedding.bias: is of another shape"),
             std::string::npos);
   EXPECT_NE(refusal([](auto& file) {
               file.tensors["distance.1.channel_weight"].values[0] = -1;
             }).find("distance.1.channel_weight: holds a negative weight"),
             std::string::npos);
-  EXPECT_NE(refusal([](auto& file) { file.tensors["distance.0.floor"].values[0] = 0; }).find("distance.0.floor: is not above 0"),
+  EXPECT_NE(refusal([](auto& file) {
+              file.tensors["distance.0.floor"].values[0] = 0;
+            }).find("distance.0.floor: is not above 0"),
             std::string::npos);
-  EXPECT_NE(input_error([&] { FigurineFeatures::load(folder / "none"); }).find("none"), std::string::npos);
+  EXPECT_NE(input_error([&] { FigurineFeatures::load(folder / "none"); }).find("none"),
+            std::string::npos);
   EXPECT_TRUE(open_networks({}).features.empty());
 }
 
@@ -258,7 +284,8 @@ TEST(Blur, KeepsWhatIsFlatAndTheMean) {
   const RgbPictures spread = blurred(point, 1);
   double sum = 0, second = 0;
   for (int y = 0; y < 21; ++y) {
-    for (int x = 0; x < 21; ++x) sum += spread.values[y * 21 + x], second += (x - 10) * (x - 10) * spread.values[y * 21 + x];
+    for (int x = 0; x < 21; ++x)
+      sum += spread.values[y * 21 + x], second += (x - 10) * (x - 10) * spread.values[y * 21 + x];
   }
   EXPECT_NEAR(sum, 1, 1e-5);
   EXPECT_NEAR(second, 1, 0.03);  // cut off at three deviations

@@ -1,5 +1,6 @@
-// Training figurine-features: it learns, it goes on after an interruption with the same bits on any number of threads, it opens nobody but
-// the training members; and its evaluation finds people again.
+// Training figurine-features: it learns, it goes on after an interruption with the same bits on any
+// number of threads, it opens nobody but the training members; and its evaluation finds people
+// again.
 #include "toolchain/evaluate/feature_trainer.h"
 
 #include <gtest/gtest.h>
@@ -31,16 +32,21 @@ class FeatureTraining : public testing::Test {
   std::string path(const std::string& name) const { return folder_ / name; }
 
   FeatureRequest request(const std::string& name, uint64_t iterations = 14) const {
-    FeatureRequest request{.population = path("people.fgn"), .body = path("body.fgn"), .output = path(name + ".safetensors")};
-    request.settings.poses = 2, request.settings.views = 3, request.settings.batch = 12;  // a piece of eight and one of four
-    request.settings.schedule.ramp_iterations = 5, request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
+    FeatureRequest request{.population = path("people.fgn"),
+                           .body = path("body.fgn"),
+                           .output = path(name + ".safetensors")};
+    request.settings.poses = 2, request.settings.views = 3,
+    request.settings.batch = 12;  // a piece of eight and one of four
+    request.settings.schedule.ramp_iterations = 5,
+    request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
     request.command = "test", request.threads = 2, request.quiet = true;
     return request;
   }
 
   std::map<std::string, std::vector<float>> tensors(const std::string& name) const {
     std::map<std::string, std::vector<float>> all;
-    for (const auto& [key, tensor] : train::read_tensor_file(path(name + ".safetensors")).tensors) all[key] = tensor.values;
+    for (const auto& [key, tensor] : train::read_tensor_file(path(name + ".safetensors")).tensors)
+      all[key] = tensor.values;
     return all;
   }
 
@@ -80,7 +86,8 @@ TEST_F(FeatureTraining, GoesOnWithTheSameBitsOnAnyNumberOfThreads) {
 
 TEST_F(FeatureTraining, OpensNobodyButTrainingMembers) {
   train_features(request("before"));
-  test::write_people(path("people.fgn"), {.other_from = 5});  // the validation and the test member are other people now
+  test::write_people(path("people.fgn"),
+                     {.other_from = 5});  // the validation and the test member are other people now
   train_features(request("after"));
   EXPECT_EQ(tensors("after"), tensors("before"));
   test::write_people(path("people.fgn"), {.other_from = 4});
@@ -94,26 +101,33 @@ TEST_F(FeatureTraining, TheFileSaysWhereItComesFrom) {
   const auto& provenance = network.provenance();
   EXPECT_EQ(provenance.at("population"), "people");
   EXPECT_EQ(provenance.at("population_hash"),
-            format_hash(train::open_package(path("people.fgn"), PackageKind::kPopulation).package.content_hash()));
-  EXPECT_EQ(nlohmann::json::parse(provenance.at("members")), nlohmann::json({"person0", "person1", "person2", "person3", "person4"}));
+            format_hash(train::open_package(path("people.fgn"), PackageKind::kPopulation)
+                            .package.content_hash()));
+  EXPECT_EQ(nlohmann::json::parse(provenance.at("members")),
+            nlohmann::json({"person0", "person1", "person2", "person3", "person4"}));
   EXPECT_EQ(nlohmann::json::parse(provenance.at("settings")).at("seed"), 1);
-  for (const char* key : {"tool", "command", "commit", "machine", "body_hash", "created", "train_seconds", "loss", "accuracy"}) {
+  for (const char* key : {"tool", "command", "commit", "machine", "body_hash", "created",
+                          "train_seconds", "loss", "accuracy"}) {
     EXPECT_TRUE(provenance.contains(key)) << key;
   }
 }
 
-// Two training members in one shot are 1 apart on average; the held-out ones, random weights too, not far from that.
+// Two training members in one shot are 1 apart on average; the held-out ones, random weights too,
+// not far from that.
 TEST_F(FeatureTraining, LearnsToTellPeopleApart) {
   test::write_people(path("people.fgn"), {.training = 6, .validation = 2, .test = 3});
   const FeatureResult result = train_features(request("run", 60));
   std::printf("  loss %.3f, %.0f %% told right\n", result.loss, 100 * result.accuracy);
   EXPECT_GT(result.accuracy, 0.6) << "chance is 17 %";
-  const ComparingNetworks networks = open_networks({.features = path("run.safetensors"), .lpips = "", .inception = ""});
+  const ComparingNetworks networks =
+      open_networks({.features = path("run.safetensors"), .lpips = "", .inception = ""});
   ASSERT_EQ(networks.features.size(), 1u);
-  const train::PackageFile population = train::open_package(path("people.fgn"), PackageKind::kPopulation),
+  const train::PackageFile population =
+                               train::open_package(path("people.fgn"), PackageKind::kPopulation),
                            body = train::open_package(path("body.fgn"), PackageKind::kBody);
   const nlohmann::json report =
-      evaluate_networks(population.package, body.package, networks, {.first_pose = 2, .poses = 2, .views = 2, .threads = 2, .quiet = true});
+      evaluate_networks(population.package, body.package, networks,
+                        {.first_pose = 2, .poses = 2, .views = 2, .threads = 2, .quiet = true});
   for (const char* part : {"held_out", "training"}) {
     const nlohmann::json& found = report.at(part);
     EXPECT_EQ(found.at("members"), 5) << "as many training members as held-out ones";
@@ -121,7 +135,8 @@ TEST_F(FeatureTraining, LearnsToTellPeopleApart) {
     EXPECT_DOUBLE_EQ(found.at("chance").get<double>(), 0.2);
     for (const char* kind : {"features", "distance"}) {
       const double share = found.at(kind).at("figurine-features").get<double>();
-      std::printf("  %s, %s: %.0f %% found, pixels %.0f %%\n", part, kind, 100 * share, 100 * found.at("pixels").get<double>());
+      std::printf("  %s, %s: %.0f %% found, pixels %.0f %%\n", part, kind, 100 * share,
+                  100 * found.at("pixels").get<double>());
       EXPECT_GT(share, 0.4) << part << ' ' << kind;
     }
   }
@@ -135,7 +150,8 @@ TEST_F(FeatureTraining, StopsAtCtrlC) {
   FeatureRequest endless = request("run", 1u << 20);
   endless.checkpoint_period_s = 0;
   std::thread user([&] {  // the first checkpoint tells that training is under way
-    while (!fs::exists(endless.output + ".checkpoint")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    while (!fs::exists(endless.output + ".checkpoint"))
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
     std::raise(SIGINT);
   });
   EXPECT_THROW(train_features(endless), train::Interrupted);
@@ -147,7 +163,8 @@ TEST_F(FeatureTraining, NamesWhatIsWrong) {
   FeatureRequest cut = request("cut");
   cut.stop_after = 1;
   EXPECT_THROW(train_features(cut), train::Interrupted);
-  EXPECT_NE(refusal(cut).find("is of a training that was stopped; --resume goes on with it"), std::string::npos);
+  EXPECT_NE(refusal(cut).find("is of a training that was stopped; --resume goes on with it"),
+            std::string::npos);
   cut.resume = true;
   test::write_people(path("people.fgn"), {.other_from = 5});
   EXPECT_NE(refusal(cut).find("population_hash is "), std::string::npos);
@@ -161,18 +178,21 @@ TEST_F(FeatureTraining, NamesWhatIsWrong) {
   body.body = path("people.fgn");
   EXPECT_NE(refusal(body).find("is a package of kind population, not body"), std::string::npos);
   test::write_people(path("people.fgn"), {.training = 1, .validation = 2, .test = 1});
-  EXPECT_NE(refusal(request("one")).find("has 1 training members, at least 2 are needed"), std::string::npos);
+  EXPECT_NE(refusal(request("one")).find("has 1 training members, at least 2 are needed"),
+            std::string::npos);
   EXPECT_FALSE(fs::exists(path("one.safetensors.checkpoint")));
 }
 
 TEST_F(FeatureTraining, EvaluationRefusesWhoeverWasLearntFrom) {
   train_features(request("run", 2));
   const std::string file = path("run.safetensors");
-  const train::PackageFile population = train::open_package(path("people.fgn"), PackageKind::kPopulation),
+  const train::PackageFile population =
+                               train::open_package(path("people.fgn"), PackageKind::kPopulation),
                            body = train::open_package(path("body.fgn"), PackageKind::kBody);
   const auto refused = [&] {
     return input_error([&] {
-      evaluate_networks(population.package, body.package, open_networks({.features = file, .lpips = "", .inception = ""}),
+      evaluate_networks(population.package, body.package,
+                        open_networks({.features = file, .lpips = "", .inception = ""}),
                         {.first_pose = 0, .poses = 2, .views = 2, .quiet = true});
     });
   };

@@ -1,5 +1,6 @@
-// What networks say of sampled people, through two simple ones: colours of pixels as the embedding, mean colours as the features. Against
-// loops, and against what copies and shuffled samples must give.
+// What networks say of sampled people, through two simple ones: colours of pixels as the embedding,
+// mean colours as the features. Against loops, and against what copies and shuffled samples must
+// give.
 #include "toolchain/evaluate/generation_networks.h"
 
 #include <gtest/gtest.h>
@@ -65,7 +66,8 @@ People random_people(size_t count, uint64_t seed) {
       picture = {kSide_px, kSide_px, {}};
       const float shade = random.uniform(0, 200);
       for (size_t i = 0; i < size_t{kSide_px} * kSide_px; ++i) {
-        for (int c = 0; c < 3; ++c) picture.rgba.push_back(static_cast<uint8_t>(shade + random.uniform(0, 50)));
+        for (int c = 0; c < 3; ++c)
+          picture.rgba.push_back(static_cast<uint8_t>(shade + random.uniform(0, 50)));
         picture.rgba.push_back(255);
       }
     }
@@ -77,19 +79,23 @@ double loop_distance(const std::vector<Picture>& a, const std::vector<Picture>& 
   double sum = 0;
   for (size_t v = 0; v < kPictures; ++v) {
     const RgbPictures x = over_grey({&a[v], 1}), y = over_grey({&b[v], 1});
-    for (size_t i = 0; i < x.values.size(); ++i) sum += std::pow(double(x.values[i]) - double(y.values[i]), 2);
+    for (size_t i = 0; i < x.values.size(); ++i)
+      sum += std::pow(double(x.values[i]) - double(y.values[i]), 2);
   }
   return sum / double(kPictures);
 }
 
 std::shared_ptr<const Pixels> pixels() { return std::make_shared<const Pixels>(); }
 
-ComparingNetworks both(size_t dimension = 3) { return {{std::make_shared<const Colours>(dimension)}, {pixels()}}; }
+ComparingNetworks both(size_t dimension = 3) {
+  return {{std::make_shared<const Colours>(dimension)}, {pixels()}};
+}
 
 double value(const nlohmann::json& of) { return of.at("value").get<double>(); }
 
 TEST(PeopleDistances, AreMeansOverPicturesOfTheSameShot) {
-  const People people = random_people(19, 1), references = random_people(5, 2);  // more than a tile's
+  const People people = random_people(19, 1),
+               references = random_people(5, 2);  // more than a tile's
   const auto network = pixels();
   const PeopleDistances found = measure_distances(*network, people, references, 2);
   EXPECT_EQ(network->seen(), (19 + 5) * kPictures) << "a picture is looked at once";
@@ -97,10 +103,12 @@ TEST(PeopleDistances, AreMeansOverPicturesOfTheSameShot) {
   for (size_t i = 0; i < people.size(); ++i) {
     for (size_t j = 0; j < references.size(); ++j) {
       const double expected = loop_distance(people[i], references[j]);
-      worst = std::max(worst, std::abs(found.to_references(Eigen::Index(i), Eigen::Index(j)) / expected - 1));
+      worst = std::max(
+          worst, std::abs(found.to_references(Eigen::Index(i), Eigen::Index(j)) / expected - 1));
     }
     for (size_t j = 0; j < people.size(); ++j) {
-      const double own = found.within(Eigen::Index(i), Eigen::Index(j)), expected = loop_distance(people[i], people[j]);
+      const double own = found.within(Eigen::Index(i), Eigen::Index(j)),
+                   expected = loop_distance(people[i], people[j]);
       EXPECT_EQ(own, found.within(Eigen::Index(j), Eigen::Index(i)));
       if (i == j) {
         EXPECT_EQ(own, 0);
@@ -122,7 +130,8 @@ TEST(PeopleFeatures, StandPersonByPerson) {
   const RowMatrix features = measure_features(network, people, 2);
   ASSERT_EQ(features.rows(), Eigen::Index(4 * kPictures));
   for (size_t i = 0; i < 4; ++i) {
-    EXPECT_EQ(features.middleRows(Eigen::Index(i * kPictures), Eigen::Index(kPictures)), network.features(over_grey(people[i])));
+    EXPECT_EQ(features.middleRows(Eigen::Index(i * kPictures), Eigen::Index(kPictures)),
+              network.features(over_grey(people[i])));
   }
 }
 
@@ -138,7 +147,8 @@ TEST(GenerationNetworks, CopiesAreFoundOut) {
   EXPECT_EQ(value(near.at("one_nna_percent")), 0);
   EXPECT_EQ(near.at("one_nna_off_ideal"), 50);
   EXPECT_NEAR(value(row.at("train").at("frechet").at("colours")), 0, 1e-12);
-  // Of equal sets the estimate is below 0, by the kernel of everybody with themselves: 2 (mean of all other pairs - mean of all pairs).
+  // Of equal sets the estimate is below 0, by the kernel of everybody with themselves: 2 (mean of
+  // all other pairs - mean of all pairs).
   EXPECT_LT(value(row.at("train").at("kid").at("colours")), 0);
   const nlohmann::json& novelty = row.at("novelty").at("perceptual").at("pixels");
   EXPECT_EQ(novelty.at("copy_share"), 1);
@@ -164,7 +174,9 @@ TEST(GenerationNetworks, TheAuditLooksForWhomASamplerLearntFrom) {
   const GenerationNetworks judge(networks, training, held_out, 2, kBootstrap);
   nlohmann::json all, half;
   judge.add_samples(training, 8, all), judge.add_samples(training, 4, half);
-  const auto audit = [](const nlohmann::json& row) { return row.at("novelty").at("perceptual").at("pixels"); };
+  const auto audit = [](const nlohmann::json& row) {
+    return row.at("novelty").at("perceptual").at("pixels");
+  };
   EXPECT_EQ(audit(all).at("copy_share"), 1);
   EXPECT_EQ(audit(all).at("members_met"), 8);
   EXPECT_GE(audit(half).at("copy_share"), 0.5);
@@ -174,12 +186,14 @@ TEST(GenerationNetworks, TheAuditLooksForWhomASamplerLearntFrom) {
 }
 
 TEST(GenerationNetworks, TheOrderOfSamplesDoesNotMatter) {
-  const People training = random_people(6, 6), held_out = random_people(6, 7), samples = random_people(6, 8);
+  const People training = random_people(6, 6), held_out = random_people(6, 7),
+               samples = random_people(6, 8);
   const ComparingNetworks networks = both();
   const GenerationNetworks judge(networks, training, held_out, 2, kBootstrap);
   nlohmann::json row, other_row;
   judge.add_samples(samples, Eigen::Index(training.size()), row);
-  judge.add_samples({samples[4], samples[0], samples[5], samples[2], samples[1], samples[3]}, Eigen::Index(training.size()), other_row);
+  judge.add_samples({samples[4], samples[0], samples[5], samples[2], samples[1], samples[3]},
+                    Eigen::Index(training.size()), other_row);
   for (const char* part : {"held_out", "train"}) {
     for (const char* key : {"mmd", "coverage_percent", "one_nna_percent"}) {
       EXPECT_NEAR(value(row.at(part).at("perceptual").at("pixels").at(key)),
@@ -187,22 +201,27 @@ TEST(GenerationNetworks, TheOrderOfSamplesDoesNotMatter) {
           << part << ' ' << key;
     }
     for (const char* kind : {"kid", "frechet"}) {
-      EXPECT_NEAR(value(row.at(part).at(kind).at("colours")), value(other_row.at(part).at(kind).at("colours")), 1e-12)
+      EXPECT_NEAR(value(row.at(part).at(kind).at("colours")),
+                  value(other_row.at(part).at(kind).at("colours")), 1e-12)
           << part << ' ' << kind;
     }
   }
   double expected = 0;  // MMD in loops
   for (const std::vector<Picture>& reference : held_out) {
     double nearest = INFINITY;
-    for (const std::vector<Picture>& sample : samples) nearest = std::min(nearest, loop_distance(sample, reference));
+    for (const std::vector<Picture>& sample : samples)
+      nearest = std::min(nearest, loop_distance(sample, reference));
     expected += nearest / double(held_out.size());
   }
-  EXPECT_NEAR(value(row.at("held_out").at("perceptual").at("pixels").at("mmd")), expected, 1e-12 * expected);
+  EXPECT_NEAR(value(row.at("held_out").at("perceptual").at("pixels").at("mmd")), expected,
+              1e-12 * expected);
 }
 
-// Eight samples are four draws of two held-out people: the interval is the first one's, the means are of all.
+// Eight samples are four draws of two held-out people: the interval is the first one's, the means
+// are of all.
 TEST(GenerationNetworks, MoreSamplesThanHeldOutPeopleAreMoreDraws) {
-  const People training = random_people(8, 12), held_out = random_people(2, 13), samples = random_people(8, 14);
+  const People training = random_people(8, 12), held_out = random_people(2, 13),
+               samples = random_people(8, 14);
   const ComparingNetworks networks = both();
   const auto judged = [&](const People& people, const People& references) {
     nlohmann::json row;
@@ -217,12 +236,14 @@ TEST(GenerationNetworks, MoreSamplesThanHeldOutPeopleAreMoreDraws) {
     People turned = samples;
     std::rotate(turned.begin(), turned.begin() + std::ptrdiff_t(2 * d), turned.end());
     const nlohmann::json one = judged(turned, held_out);
-    for (const char* key : {"mmd", "coverage_percent", "one_nna_percent"}) sums[key] += value(one.at(key)) / 4;
+    for (const char* key : {"mmd", "coverage_percent", "one_nna_percent"})
+      sums[key] += value(one.at(key)) / 4;
     if (d == 0) {
       EXPECT_EQ(one, found);
     }
   }
-  for (const auto& [key, mean] : sums) EXPECT_NEAR(draws.at(key).get<double>(), mean, 1e-12 * mean) << key;
+  for (const auto& [key, mean] : sums)
+    EXPECT_NEAR(draws.at(key).get<double>(), mean, 1e-12 * mean) << key;
   EXPECT_NE(draws.at("mmd"), found.at("mmd").at("value"));
   EXPECT_FALSE(judged(samples, random_people(5, 15)).contains("draws")) << "there is one";
 }
@@ -235,7 +256,8 @@ TEST(GenerationNetworks, LeaveTheFrechetDistanceOutWherePicturesAreFew) {
   nlohmann::json row;
   judge.add_samples(training, Eigen::Index(training.size()), row);
   EXPECT_TRUE(row.at("train").at("frechet").at("colours").contains("value"));
-  EXPECT_EQ(row.at("held_out").at("frechet").at("colours"), nlohmann::json({{"left_out", "12 pictures are too few for 6 features"}}));
+  EXPECT_EQ(row.at("held_out").at("frechet").at("colours"),
+            nlohmann::json({{"left_out", "12 pictures are too few for 6 features"}}));
   EXPECT_TRUE(row.at("held_out").at("kid").at("colours").at("value").is_number());
 }
 
@@ -244,7 +266,8 @@ TEST(GenerationNetworks, SayNothingWhereThereAreNone) {
   const ComparingNetworks none;
   const GenerationNetworks judge(none, people, people, 1, kBootstrap);
   nlohmann::json row = nlohmann::json::object();
-  judge.add_samples(people, Eigen::Index(people.size()), row), judge.add_training_as_samples(row), judge.add_held_out_novelty(row);
+  judge.add_samples(people, Eigen::Index(people.size()), row), judge.add_training_as_samples(row),
+      judge.add_held_out_novelty(row);
   EXPECT_TRUE(row.empty()) << row;
 }
 

@@ -1,4 +1,5 @@
-// The kernel distance of people who have several pictures each: against loops, and without the bias that pictures of one person have.
+// The kernel distance of people who have several pictures each: against loops, and without the bias
+// that pictures of one person have.
 #include "toolchain/evaluate/kernel_distance.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +14,9 @@ namespace {
 
 using tests::random_rows;
 
-double kernel_of(const RowVector& x, const RowVector& y) { return std::pow(x.dot(y) / double(x.size()) + 1, 3); }
+double kernel_of(const RowVector& x, const RowVector& y) {
+  return std::pow(x.dot(y) / double(x.size()) + 1, 3);
+}
 
 // Mean over pairs of pictures of different people, of two sets or of one.
 double loops(const RowMatrix& a, const RowMatrix& b, Eigen::Index v, bool one_set) {
@@ -48,12 +51,13 @@ TEST(KernelComparison, ListsPeopleAsOftenAsTheyCountAndNeverAgainstThemselves) {
   RowMatrix pair(4, 3);
   pair << a.topRows(2), a.middleRows(4, 2);
   const KernelComparison of_two(pair, b, 2);
-  EXPECT_NEAR(comparison.distance({{0, 2, 0, 2}, {0, 1, 2}}), of_two.distance(of_two.all()), 1e-12) << "copies are no pairs";
+  EXPECT_NEAR(comparison.distance({{0, 2, 0, 2}, {0, 1, 2}}), of_two.distance(of_two.all()), 1e-12)
+      << "copies are no pairs";
   EXPECT_TRUE(std::isnan(comparison.distance({{1, 1}, {0, 1, 2}})));
 }
 
-// Sets of one distribution: people far apart, pictures of one person alike. The estimate over people has mean 0, that over pictures has
-// not.
+// Sets of one distribution: people far apart, pictures of one person alike. The estimate over
+// people has mean 0, that over pictures has not.
 TEST(KernelComparison, HasNoBiasWhereOnePersonsPicturesAreAlike) {
   constexpr Eigen::Index kPeople = 12, kPictures = 6, kTrials = 400;
   double people_sum = 0, people_squares = 0, pictures_sum = 0, pictures_squares = 0;
@@ -65,16 +69,20 @@ TEST(KernelComparison, HasNoBiasWhereOnePersonsPicturesAreAlike) {
       for (Eigen::Index i = 0; i < sets[s].rows(); ++i) sets[s].row(i) += people.row(i / kPictures);
     }
     const KernelComparison comparison(sets[0], sets[1], kPictures);
-    const double of_people = comparison.distance(comparison.all()), of_pictures = kernel_distance(sets[0], sets[1]);
+    const double of_people = comparison.distance(comparison.all()),
+                 of_pictures = kernel_distance(sets[0], sets[1]);
     people_sum += of_people, people_squares += of_people * of_people;
     pictures_sum += of_pictures, pictures_squares += of_pictures * of_pictures;
   }
   const auto error = [&](double sum, double squares) {
-    return std::sqrt((squares - sum * sum / double(kTrials)) / double(kTrials - 1) / double(kTrials));
+    return std::sqrt((squares - sum * sum / double(kTrials)) / double(kTrials - 1) /
+                     double(kTrials));
   };
   const double people = people_sum / double(kTrials), pictures = pictures_sum / double(kTrials);
-  const double people_error = error(people_sum, people_squares), pictures_error = error(pictures_sum, pictures_squares);
-  std::printf("  over people %.3f +- %.3f, over pictures %.3f +- %.3f\n", people, people_error, pictures, pictures_error);
+  const double people_error = error(people_sum, people_squares),
+               pictures_error = error(pictures_sum, pictures_squares);
+  std::printf("  over people %.3f +- %.3f, over pictures %.3f +- %.3f\n", people, people_error,
+              pictures, pictures_error);
   EXPECT_LT(std::abs(people), 4 * people_error);
   EXPECT_GT(pictures, 4 * pictures_error) << "or the two could not be told apart";
 }

@@ -1,5 +1,5 @@
-// Pictures of members that are compared: the fast comparison is the plain one, cameras hold what they were framed on, a mixture's ends are
-// the members themselves.
+// Pictures of members that are compared: the fast comparison is the plain one, cameras hold what
+// they were framed on, a mixture's ends are the members themselves.
 #include "toolchain/evaluate/member_pictures.h"
 
 #include <gtest/gtest.h>
@@ -22,8 +22,10 @@ using tests::make_test_body;
 Picture random_picture(tests::Random& random) {
   Picture picture{12, 10, {}};
   for (size_t i = 0; i < 120; ++i) {
-    const auto alpha = static_cast<uint8_t>(random.uniform(0, 1) < 0.5f ? 0 : random.uniform(0, 256));
-    for (int c = 0; c < 3; ++c) picture.rgba.push_back(static_cast<uint8_t>(random.uniform(0, float(alpha) + 1)));
+    const auto alpha =
+        static_cast<uint8_t>(random.uniform(0, 1) < 0.5f ? 0 : random.uniform(0, 256));
+    for (int c = 0; c < 3; ++c)
+      picture.rgba.push_back(static_cast<uint8_t>(random.uniform(0, float(alpha) + 1)));
     picture.rgba.push_back(alpha);
   }
   return picture;
@@ -32,7 +34,8 @@ Picture random_picture(tests::Random& random) {
 TEST(UnionError, CountsBothForegroundsOverGrey) {
   Picture a{3, 1, {255, 255, 255, 255, 0, 0, 0, 0, 0, 0, 0, 100}};
   const Picture b{3, 1, {255, 255, 255, 255, 255, 255, 255, 255, 90, 0, 0, 100}};
-  const SquaredError error = union_error(a, b);  // the first is equal, the second white against grey, the third nobody's foreground
+  const SquaredError error = union_error(
+      a, b);  // the first is equal, the second white against grey, the third nobody's foreground
   EXPECT_EQ(error.count, 6u);
   EXPECT_NEAR(error.sum, 3 * 0.25, 1e-12);
   EXPECT_EQ(union_error(b, a).sum, error.sum);
@@ -57,7 +60,8 @@ TEST(Studio, FramesWhatItLookedAt) {
   const tests::SyntheticBody body = make_test_body();
   const tests::SyntheticAvatar avatar = make_test_avatar(body);
   const tests::SyntheticPose pose = tests::make_test_pose(body.body(), 1);
-  Studio studio(*body.package, {{pose.root_translation_m, pose.rotations}}, {{.pose = 0, .azimuth_deg = 20, .grounded = true}});
+  Studio studio(*body.package, {{pose.root_translation_m, pose.rotations}},
+                {{.pose = 0, .azimuth_deg = 20, .grounded = true}});
   studio.frame(0, studio.look(avatar.package->avatar())[0], 60, 90, 0.2f);
   const std::vector<Picture> pictures = studio.draw(avatar.package->avatar(), 0, 1);
   ASSERT_EQ(pictures.size(), 1u);
@@ -79,10 +83,13 @@ TEST(Mix, EndsAreTheMembers) {
                                two = make_test_avatar(body, {.shape = {0, 3}, .seed = 2});
   const Avatar &a = one.package->avatar(), &b = two.package->avatar();
   std::vector<float> storage;
-  EXPECT_TRUE(std::ranges::equal(mix(a, b, 0, storage).network.layers[0].weights, a.network.layers[0].weights));
-  EXPECT_TRUE(std::ranges::equal(mix(a, b, 1, storage).network.layers[0].weights, b.network.layers[0].weights));
+  EXPECT_TRUE(std::ranges::equal(mix(a, b, 0, storage).network.layers[0].weights,
+                                 a.network.layers[0].weights));
+  EXPECT_TRUE(std::ranges::equal(mix(a, b, 1, storage).network.layers[0].weights,
+                                 b.network.layers[0].weights));
   const Avatar middle = mix(a, b, 0.5, storage);
-  EXPECT_FLOAT_EQ(middle.network.layers[0].bias[0], 0.5f * (a.network.layers[0].bias[0] + b.network.layers[0].bias[0]));
+  EXPECT_FLOAT_EQ(middle.network.layers[0].bias[0],
+                  0.5f * (a.network.layers[0].bias[0] + b.network.layers[0].bias[0]));
   EXPECT_FLOAT_EQ(middle.shape[0], 0.5f);
   EXPECT_FLOAT_EQ(middle.shape[1], 1.5f);
 }

@@ -10,7 +10,8 @@ namespace {
 
 Picture filled(uint32_t width, uint32_t height, std::array<uint8_t, 4> rgba) {
   Picture picture{width, height, {}};
-  for (uint32_t i = 0; i < width * height; ++i) picture.rgba.insert(picture.rgba.end(), rgba.begin(), rgba.end());
+  for (uint32_t i = 0; i < width * height; ++i)
+    picture.rgba.insert(picture.rgba.end(), rgba.begin(), rgba.end());
   return picture;
 }
 
@@ -89,7 +90,8 @@ TEST(FlatColour, EqualsTheErrorOfThatPicture) {
     for (int x = 0; x < 16; ++x) {
       const int alpha = std::min(255, 40 * x);
       set(truth, x, y,
-          {uint8_t(alpha * ((x * 7 + y * 13) % 11) / 11), uint8_t(alpha * (y % 5) / 5), uint8_t(alpha * (x % 3) / 3), uint8_t(alpha)});
+          {uint8_t(alpha * ((x * 7 + y * 13) % 11) / 11), uint8_t(alpha * (y % 5) / 5),
+           uint8_t(alpha * (x % 3) / 3), uint8_t(alpha)});
     }
   }
   FlatColour flat;
@@ -124,7 +126,8 @@ TEST(HighPass, OfEqualPicturesIsOneAndOfAFlatOneZero) {
   }
   EXPECT_NEAR(high_pass(truth, truth).ratio(), 1, 1e-12);
   EXPECT_NEAR(high_pass(filled(9, 9, {128, 128, 128, 255}), truth).ratio(), 0, 1e-12);
-  // A checkerboard's binomial blur is 1/2 everywhere: each of 7x7 inner pixels and 3 channels has energy 1/4.
+  // A checkerboard's binomial blur is 1/2 everywhere: each of 7x7 inner pixels and 3 channels has
+  // energy 1/4.
   EXPECT_NEAR(high_pass(truth, truth).truth, 49 * 3 * 0.25, 1e-6);
 }
 
@@ -133,7 +136,8 @@ TEST(HighPass, LeavesTheSilhouetteOut) {
   for (int y = 2; y < 5; ++y) {
     for (int x = 2; x < 5; ++x) set(truth, x, y, {255, 255, 255, 255});
   }
-  EXPECT_EQ(high_pass(truth, truth).truth, 0) << "only the centre has eight foreground neighbours, and it is flat there";
+  EXPECT_EQ(high_pass(truth, truth).truth, 0)
+      << "only the centre has eight foreground neighbours, and it is flat there";
 }
 
 TEST(FrameDifference, OfStillPredictionIsTheTruthsOwnChange) {

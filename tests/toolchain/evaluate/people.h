@@ -18,7 +18,8 @@ namespace figurine::evaluate::test {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "figurine_evaluate_test_XXXXXX").string();
+    std::string name =
+        (std::filesystem::temp_directory_path() / "figurine_evaluate_test_XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
     path_ = name;
   }
@@ -46,15 +47,17 @@ inline void write_people(const std::string& path, const PeopleOptions& options =
   std::vector<tests::SyntheticAvatar> avatars;
   for (size_t m = 0; m < count; ++m) {
     const uint64_t seed = m < options.other_from ? m : 1000 + m;
-    avatars.push_back(
-        tests::make_test_avatar(body, {.shape = {0.1f * static_cast<float>(m), 0.2f}, .seed = seed, .name = "person" + std::to_string(m)}));
+    avatars.push_back(tests::make_test_avatar(body, {.shape = {0.1f * static_cast<float>(m), 0.2f},
+                                                     .seed = seed,
+                                                     .name = "person" + std::to_string(m)}));
   }
   NewPopulation population{.name = "people", .initial = initial.package->avatar().network};
   for (size_t m = 0; m < count; ++m) {
     const Split split = m < options.training                        ? Split::kTrain
                         : m < options.training + options.validation ? Split::kValidation
                                                                     : Split::kTest;
-    population.members.push_back({&avatars[m].package->avatar(), &avatars[m].package->provenance(), split});
+    population.members.push_back(
+        {&avatars[m].package->avatar(), &avatars[m].package->provenance(), split});
   }
   const auto bytes = write_population(population);
   ASSERT_TRUE(bytes.ok()) << bytes.status().message();
@@ -77,6 +80,8 @@ std::string input_error(F&& f) {
   return "none";
 }
 
-inline bool is_one_line(const std::string& message) { return message.find('\n') == std::string::npos; }
+inline bool is_one_line(const std::string& message) {
+  return message.find('\n') == std::string::npos;
+}
 
 }  // namespace figurine::evaluate::test

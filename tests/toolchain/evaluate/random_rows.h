@@ -8,14 +8,17 @@ namespace figurine::tests {
 
 inline evaluate::RowMatrix random_rows(Eigen::Index rows, Eigen::Index columns, uint64_t seed) {
   evaluate::RowMatrix values(rows, columns);
-  for (Eigen::Index i = 0; i < values.size(); ++i) values.data()[i] = stream_normals(seed, 0, uint64_t(i) / 4)[size_t(i) % 4];
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    values.data()[i] = stream_normals(seed, 0, uint64_t(i) / 4)[size_t(i) % 4];
   return values;
 }
 
 // The rows in the order given.
-inline evaluate::RowMatrix in_order(const evaluate::RowMatrix& rows, const std::vector<size_t>& order) {
+inline evaluate::RowMatrix in_order(const evaluate::RowMatrix& rows,
+                                    const std::vector<size_t>& order) {
   evaluate::RowMatrix chosen(Eigen::Index(order.size()), rows.cols());
-  for (size_t i = 0; i < order.size(); ++i) chosen.row(Eigen::Index(i)) = rows.row(Eigen::Index(order[i]));
+  for (size_t i = 0; i < order.size(); ++i)
+    chosen.row(Eigen::Index(i)) = rows.row(Eigen::Index(order[i]));
   return chosen;
 }
 

@@ -19,7 +19,8 @@ TEST(RandomStream, IntegersAreTheirWordsShareOfTheCount) {
     const auto words = stream_words(7, number, counter / 2);
     const uint64_t word = uint64_t{words[counter % 2 * 2]} << 32 | words[counter % 2 * 2 + 1];
     for (const uint64_t count : {1ull, 2ull, 5ull, 1000ull, 0xffffffffull}) {
-      const auto wanted = static_cast<uint64_t>((static_cast<unsigned __int128>(word) * count) >> 64);
+      const auto wanted =
+          static_cast<uint64_t>((static_cast<unsigned __int128>(word) * count) >> 64);
       ASSERT_EQ(stream.index(counter, count), wanted);
       ASSERT_LT(wanted, count);
     }
@@ -32,7 +33,8 @@ TEST(RandomStream, IntegersAreUniform) {
   std::vector<size_t> counts(kCount, 0);
   for (size_t i = 0; i < kDraws; ++i) ++counts[stream.index(i, kCount)];
   double chi2 = 0;
-  for (const size_t count : counts) chi2 += (double(count) - 10'000) * (double(count) - 10'000) / 10'000;
+  for (const size_t count : counts)
+    chi2 += (double(count) - 10'000) * (double(count) - 10'000) / 10'000;
   EXPECT_LT(chi2, 22.5) << "the 99.9th percentile of chi-squared with 6 degrees of freedom";
 }
 
@@ -40,12 +42,14 @@ TEST(RandomStream, EverySetIsAsLikelyAsAnyOther) {
   std::map<std::set<size_t>, size_t> counts;
   constexpr uint32_t kDraws = 20'000;
   for (uint32_t item = 0; item < kDraws; ++item) {
-    const std::vector<size_t> chosen = RandomStream(2, RandomUse::kAveragedMembers, item).distinct(3, 5);
+    const std::vector<size_t> chosen =
+        RandomStream(2, RandomUse::kAveragedMembers, item).distinct(3, 5);
     ++counts[{chosen.begin(), chosen.end()}];
   }
   ASSERT_EQ(counts.size(), 10u) << "five over three, and no member twice";
   double chi2 = 0;
-  for (const auto& [set, count] : counts) chi2 += (double(count) - 2'000) * (double(count) - 2'000) / 2'000;
+  for (const auto& [set, count] : counts)
+    chi2 += (double(count) - 2'000) * (double(count) - 2'000) / 2'000;
   EXPECT_LT(chi2, 27.9) << "the 99.9th percentile of chi-squared with 9 degrees of freedom";
 }
 
@@ -69,7 +73,8 @@ TEST(RandomStream, UsesItemsAndSeedsDiffer) {
   EXPECT_NE(first_values(1, RandomUse::kGaussianValues, 6), values);
   std::vector<double> longer(9);
   RandomStream(1, RandomUse::kGaussianValues, 5).fill_normal(longer);
-  EXPECT_TRUE(std::equal(values.begin(), values.end(), longer.begin())) << "a longer draw begins with the shorter one";
+  EXPECT_TRUE(std::equal(values.begin(), values.end(), longer.begin()))
+      << "a longer draw begins with the shorter one";
 }
 
 }  // namespace

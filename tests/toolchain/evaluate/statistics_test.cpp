@@ -35,7 +35,8 @@ TEST(Statistics, HistogramsCountEverything) {
 }
 
 TEST(Statistics, CorrelationsSeeLinesAndOrders) {
-  const double x[] = {1, 2, 3, 4, kNothing}, line[] = {5, 3, 1, -1, 7}, bent[] = {1, 10, 100, 1000, 3}, flat[] = {2, 2, 2, 2, 2};
+  const double x[] = {1, 2, 3, 4, kNothing}, line[] = {5, 3, 1, -1, 7},
+               bent[] = {1, 10, 100, 1000, 3}, flat[] = {2, 2, 2, 2, 2};
   EXPECT_NEAR(pearson_correlation(x, line), -1, 1e-15);
   EXPECT_LT(pearson_correlation(x, bent), 0.9);
   EXPECT_NEAR(spearman_correlation(x, bent), 1, 1e-15);

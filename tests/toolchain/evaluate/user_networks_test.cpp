@@ -1,5 +1,5 @@
-// Networks that the user brings, on random weights: what LPIPS and Inception features come out is what loops written down from their
-// definitions give; what a file lacks is said in one line.
+// Networks that the user brings, on random weights: what LPIPS and Inception features come out is
+// what loops written down from their definitions give; what a file lacks is said in one line.
 #include "toolchain/evaluate/user_networks.h"
 
 #include <gtest/gtest.h>
@@ -33,8 +33,12 @@ Planes planes_of(const RgbView& picture) {
 }
 
 // weights: [out,in,k,k]. ReLU behind it.
-Planes convolved(const Planes& in, const Values& weights, const Values& bias, size_t kernel, size_t stride, size_t padding) {
-  Planes out{bias.size(), (in.height + 2 * padding - kernel) / stride + 1, (in.width + 2 * padding - kernel) / stride + 1, {}};
+Planes convolved(const Planes& in, const Values& weights, const Values& bias, size_t kernel,
+                 size_t stride, size_t padding) {
+  Planes out{bias.size(),
+             (in.height + 2 * padding - kernel) / stride + 1,
+             (in.width + 2 * padding - kernel) / stride + 1,
+             {}};
   for (size_t o = 0; o < out.channels; ++o) {
     for (size_t y = 0; y < out.height; ++y) {
       for (size_t x = 0; x < out.width; ++x) {
@@ -43,8 +47,10 @@ Planes convolved(const Planes& in, const Values& weights, const Values& bias, si
           for (size_t j = 0; j < kernel; ++j) {
             for (size_t i = 0; i < kernel; ++i) {
               const size_t v = y * stride + j, u = x * stride + i;
-              if (v < padding || u < padding || v - padding >= in.height || u - padding >= in.width) continue;
-              sum += weights[((o * in.channels + c) * kernel + j) * kernel + i] * in.at(c, v - padding, u - padding);
+              if (v < padding || u < padding || v - padding >= in.height || u - padding >= in.width)
+                continue;
+              sum += weights[((o * in.channels + c) * kernel + j) * kernel + i] *
+                     in.at(c, v - padding, u - padding);
             }
           }
         }
@@ -61,7 +67,8 @@ Planes pooled(const Planes& in) {
     for (size_t y = 0; y < out.height; ++y) {
       for (size_t x = 0; x < out.width; ++x) {
         double greatest = -1e30;
-        for (size_t k = 0; k < 9; ++k) greatest = std::max(greatest, in.at(c, 2 * y + k / 3, 2 * x + k % 3));
+        for (size_t k = 0; k < 9; ++k)
+          greatest = std::max(greatest, in.at(c, 2 * y + k / 3, 2 * x + k % 3));
         out.values.push_back(greatest);
       }
     }
@@ -75,14 +82,17 @@ struct Arrays {
   std::map<std::string, Values> values;
 };
 
-constexpr const char* kLayers[] = {"net.slice1.0", "net.slice2.3", "net.slice3.6", "net.slice4.8", "net.slice5.10"};
-constexpr size_t kIn[] = {3, 64, 192, 384, 256}, kOut[] = {64, 192, 384, 256, 256}, kKernel[] = {11, 5, 3, 3, 3};
+constexpr const char* kLayers[] = {"net.slice1.0", "net.slice2.3", "net.slice3.6", "net.slice4.8",
+                                   "net.slice5.10"};
+constexpr size_t kIn[] = {3, 64, 192, 384, 256}, kOut[] = {64, 192, 384, 256, 256},
+                 kKernel[] = {11, 5, 3, 3, 3};
 
 const Arrays& random_arrays() {
   static const Arrays arrays = [] {
     Arrays made;
     tests::Random random(11);
-    const auto add = [&](const std::string& name, const std::vector<size_t>& shape, float low, float high) {
+    const auto add = [&](const std::string& name, const std::vector<size_t>& shape, float low,
+                         float high) {
       size_t count = 1;
       for (const size_t side : shape) count *= side;
       made.shapes[name] = shape;
@@ -90,7 +100,8 @@ const Arrays& random_arrays() {
     };
     for (size_t l = 0; l < 5; ++l) {
       const float bound = std::sqrt(6.0f / static_cast<float>(kIn[l] * kKernel[l] * kKernel[l]));
-      add(std::string(kLayers[l]) + ".weight", {kOut[l], kIn[l], kKernel[l], kKernel[l]}, -bound, bound);
+      add(std::string(kLayers[l]) + ".weight", {kOut[l], kIn[l], kKernel[l], kKernel[l]}, -bound,
+          bound);
       add(std::string(kLayers[l]) + ".bias", {kOut[l]}, -0.1f, 0.1f);
       add("lin" + std::to_string(l) + ".model.1.weight", {1, kOut[l], 1, 1}, 0, 1);
     }
@@ -101,8 +112,10 @@ const Arrays& random_arrays() {
 
 void write_npz(const std::string& path, const Arrays& arrays) {
   std::map<std::string, std::string> files;
-  for (const auto& [name, shape] : arrays.shapes) files[name] = body::test::npy_bytes("<f4", shape, arrays.values.at(name));
-  files["scaling_layer.shift"] = body::test::npy_bytes("<f4", {1, 3, 1, 1}, {-0.03, -0.088, -0.188});  // a whole state may be in it
+  for (const auto& [name, shape] : arrays.shapes)
+    files[name] = body::test::npy_bytes("<f4", shape, arrays.values.at(name));
+  files["scaling_layer.shift"] = body::test::npy_bytes(
+      "<f4", {1, 3, 1, 1}, {-0.03, -0.088, -0.188});  // a whole state may be in it
   body::test::write_npz(path, files);
 }
 
@@ -116,7 +129,8 @@ void write_script(const std::string& path, const Arrays& arrays) {
   for (const auto& [name, shape] : arrays.shapes) {
     Node* node = &root;
     size_t begin = 0;
-    for (size_t dot = name.find('.'); dot != std::string::npos; begin = dot + 1, dot = name.find('.', begin)) {
+    for (size_t dot = name.find('.'); dot != std::string::npos;
+         begin = dot + 1, dot = name.find('.', begin)) {
       node = &node->children[name.substr(begin, dot - begin)];
     }
     node->children[name.substr(begin)].array = name;
@@ -129,8 +143,10 @@ void write_script(const std::string& path, const Arrays& arrays) {
         module.register_module(name, build(child));
       } else {
         const std::vector<size_t>& shape = arrays.shapes.at(child.array);
-        const torch::Tensor values = torch::tensor(arrays.values.at(child.array)).to(torch::kFloat32);
-        module.register_parameter(name, values.view(std::vector<int64_t>(shape.begin(), shape.end())), false);
+        const torch::Tensor values =
+            torch::tensor(arrays.values.at(child.array)).to(torch::kFloat32);
+        module.register_parameter(
+            name, values.view(std::vector<int64_t>(shape.begin(), shape.end())), false);
       }
     }
     return module;
@@ -150,8 +166,9 @@ double lpips_of(const Arrays& arrays, const RgbView& a, const RgbView& b) {
     }
     for (size_t l = 0; l < 5; ++l) {
       if (l == 1 || l == 2) x = pooled(x);
-      x = convolved(x, arrays.values.at(std::string(kLayers[l]) + ".weight"), arrays.values.at(std::string(kLayers[l]) + ".bias"),
-                    kKernel[l], l == 0 ? 4 : 1, l < 2 ? 2 : 1);
+      x = convolved(x, arrays.values.at(std::string(kLayers[l]) + ".weight"),
+                    arrays.values.at(std::string(kLayers[l]) + ".bias"), kKernel[l], l == 0 ? 4 : 1,
+                    l < 2 ? 2 : 1);
       layers[p].push_back(x);
     }
   }
@@ -164,10 +181,12 @@ double lpips_of(const Arrays& arrays, const RgbView& a, const RgbView& b) {
     for (size_t p = 0; p < positions; ++p) {
       double xx = 0, yy = 0;
       for (size_t c = 0; c < x.channels; ++c) {
-        xx += x.values[c * positions + p] * x.values[c * positions + p], yy += y.values[c * positions + p] * y.values[c * positions + p];
+        xx += x.values[c * positions + p] * x.values[c * positions + p],
+            yy += y.values[c * positions + p] * y.values[c * positions + p];
       }
       for (size_t c = 0; c < x.channels; ++c) {
-        const double d = x.values[c * positions + p] / (std::sqrt(xx) + 1e-10) - y.values[c * positions + p] / (std::sqrt(yy) + 1e-10);
+        const double d = x.values[c * positions + p] / (std::sqrt(xx) + 1e-10) -
+                         y.values[c * positions + p] / (std::sqrt(yy) + 1e-10);
         sum += w[c] * d * d;
       }
     }
@@ -181,7 +200,8 @@ TEST(Lpips, IsWhatItsDefinitionGives) {
   write_npz(folder / "alex.npz", random_arrays());
   const LpipsAlex network = LpipsAlex::load(folder / "alex.npz");
   const RgbPictures pictures = rectangles(67, 51, 2, 1);
-  const double expected = lpips_of(random_arrays(), pictures[0], pictures[1]), found = network.distance(pictures[0], pictures[1]);
+  const double expected = lpips_of(random_arrays(), pictures[0], pictures[1]),
+               found = network.distance(pictures[0], pictures[1]);
   std::printf("  distance %.6f, relative error %.1e\n", found, std::abs(found / expected - 1));
   EXPECT_NEAR(found, expected, 1e-5 * expected);  // float activations against double ones
   EXPECT_EQ(network.distance(pictures[0], pictures[0]), 0);
@@ -197,7 +217,9 @@ TEST(Lpips, IsTheSameFromAScript) {
   write_script(folder / "alex.pt", random_arrays());
   const RgbPictures pictures = rectangles(64, 64, 2, 2);
   const double npz = LpipsAlex::load(folder / "alex.npz").distance(pictures[0], pictures[1]);
-  EXPECT_EQ(open_networks({.features = "", .lpips = folder / "alex.pt", .inception = ""}).perceptual[0]->distance(pictures[0], pictures[1]),
+  EXPECT_EQ(open_networks({.features = "", .lpips = folder / "alex.pt", .inception = ""})
+                .perceptual[0]
+                ->distance(pictures[0], pictures[1]),
             npz);
 }
 
@@ -214,27 +236,42 @@ TEST(Lpips, SaysWhatAFileLacks) {
   };
   const auto without = [](Arrays& arrays) { arrays.shapes.erase("net.slice3.6.bias"); };
   EXPECT_NE(refusal("a.npz", without).find("net.slice3.6.bias: no such array"), std::string::npos);
-  EXPECT_NE(refusal("a.pt", without).find("net.slice3.6.bias: no such parameter"), std::string::npos);
-  const auto reshaped = [](Arrays& arrays) { arrays.shapes["lin4.model.1.weight"] = {256, 1, 1, 1}; };
-  EXPECT_NE(refusal("b.npz", reshaped).find("lin4.model.1.weight: shape (256,1,1,1), expected (1,256,1,1)"), std::string::npos);
-  EXPECT_NE(refusal("b.pt", reshaped).find("lin4.model.1.weight: shape [256, 1, 1, 1], expected [1, 256, 1, 1]"), std::string::npos);
-  EXPECT_NE(refusal("c.npz", [](Arrays& arrays) { arrays.values["lin0.model.1.weight"][5] = -0.5; }).find("negative weight"),
+  EXPECT_NE(refusal("a.pt", without).find("net.slice3.6.bias: no such parameter"),
             std::string::npos);
-  EXPECT_NE(refusal("d.npz", [](Arrays& arrays) { arrays.values["net.slice1.0.bias"][5] = NAN; }).find("not finite"), std::string::npos);
+  const auto reshaped = [](Arrays& arrays) {
+    arrays.shapes["lin4.model.1.weight"] = {256, 1, 1, 1};
+  };
+  EXPECT_NE(refusal("b.npz", reshaped)
+                .find("lin4.model.1.weight: shape (256,1,1,1), expected (1,256,1,1)"),
+            std::string::npos);
+  EXPECT_NE(refusal("b.pt", reshaped)
+                .find("lin4.model.1.weight: shape [256, 1, 1, 1], expected [1, 256, 1, 1]"),
+            std::string::npos);
+  EXPECT_NE(refusal("c.npz", [](Arrays& arrays) { arrays.values["lin0.model.1.weight"][5] = -0.5; })
+                .find("negative weight"),
+            std::string::npos);
+  EXPECT_NE(refusal("d.npz", [](Arrays& arrays) { arrays.values["net.slice1.0.bias"][5] = NAN; })
+                .find("not finite"),
+            std::string::npos);
   body::test::write_text(folder / "e.npz", "no zip");
-  EXPECT_NE(input_error([&] { LpipsAlex::load(folder / "e.npz"); }).find("not a readable .npz"), std::string::npos);
+  EXPECT_NE(input_error([&] { LpipsAlex::load(folder / "e.npz"); }).find("not a readable .npz"),
+            std::string::npos);
   body::test::write_text(folder / "e.pt", "no script");
   const std::string no_script = input_error([&] { LpipsAlex::load(folder / "e.pt"); });
   EXPECT_NE(no_script.find("not a TorchScript file"), std::string::npos);
   EXPECT_TRUE(test::is_one_line(no_script)) << no_script;
-  EXPECT_NE(input_error([&] { LpipsAlex::load(folder / "none.pt"); }).find("none.pt: cannot open"), std::string::npos);
+  EXPECT_NE(input_error([&] { LpipsAlex::load(folder / "none.pt"); }).find("none.pt: cannot open"),
+            std::string::npos);
   write_npz(folder / "alex.npz", random_arrays());
   const LpipsAlex network = LpipsAlex::load(folder / "alex.npz");
   const RgbPictures small = rectangles(30, 64, 2, 1);
-  EXPECT_NE(input_error([&] { network.distance(small[0], small[1]); }).find("at least 31x31, not 30x64"), std::string::npos);
+  EXPECT_NE(
+      input_error([&] { network.distance(small[0], small[1]); }).find("at least 31x31, not 30x64"),
+      std::string::npos);
 }
 
-void write_inception(const std::string& path, const std::string& source, const torch::Tensor& kernel) {
+void write_inception(const std::string& path, const std::string& source,
+                     const torch::Tensor& kernel) {
   torch::jit::Module module("__torch__.Inception");
   module.register_parameter("kernel", kernel, false);
   module.define(source);
@@ -248,7 +285,8 @@ constexpr const char* kPooled =
 // Half-pixel centres, edges repeated; then [-1,1].
 TEST(Inception, TakesPicturesResizedTo299) {
   const test::TemporaryFolder folder;
-  const torch::Tensor kernel = torch::randn({5, 3, 7, 7}, at::make_generator<at::CPUGeneratorImpl>(uint64_t{5}));
+  const torch::Tensor kernel =
+      torch::randn({5, 3, 7, 7}, at::make_generator<at::CPUGeneratorImpl>(uint64_t{5}));
   write_inception(folder / "net.pt", kPooled, kernel);
   const InceptionFeatures network(folder / "net.pt");
   EXPECT_EQ(network.dimension(), 5u);
@@ -267,20 +305,22 @@ TEST(Inception, TakesPicturesResizedTo299) {
       for (size_t y = 0; y < 299; ++y) {
         for (size_t x = 0; x < 299; ++x) {
           const double v = source(y, in.height), u = source(x, in.width);
-          const size_t y0 = static_cast<size_t>(v), x0 = static_cast<size_t>(u), y1 = std::min(y0 + 1, in.height - 1),
-                       x1 = std::min(x0 + 1, in.width - 1);
+          const size_t y0 = static_cast<size_t>(v), x0 = static_cast<size_t>(u),
+                       y1 = std::min(y0 + 1, in.height - 1), x1 = std::min(x0 + 1, in.width - 1);
           const double fy = v - static_cast<double>(y0), fx = u - static_cast<double>(x0);
-          const double value =
-              (1 - fy) * ((1 - fx) * in.at(c, y0, x0) + fx * in.at(c, y0, x1)) + fy * ((1 - fx) * in.at(c, y1, x0) + fx * in.at(c, y1, x1));
+          const double value = (1 - fy) * ((1 - fx) * in.at(c, y0, x0) + fx * in.at(c, y0, x1)) +
+                               fy * ((1 - fx) * in.at(c, y1, x0) + fx * in.at(c, y1, x1));
           resized.values.push_back(2 * value - 1);
         }
       }
     }
     const float* weights = kernel.data_ptr<float>();
-    const Planes out = convolved(resized, Values(weights, weights + kernel.numel()), Values(5, 0.0), 7, 16, 0);
+    const Planes out =
+        convolved(resized, Values(weights, weights + kernel.numel()), Values(5, 0.0), 7, 16, 0);
     for (size_t f = 0; f < 5; ++f) {
       double mean = 0;
-      for (size_t p = 0; p < out.height * out.width; ++p) mean += out.values[f * out.height * out.width + p];
+      for (size_t p = 0; p < out.height * out.width; ++p)
+        mean += out.values[f * out.height * out.width + p];
       mean /= static_cast<double>(out.height * out.width);
       worst = std::max(worst, std::abs(found(Eigen::Index(n), Eigen::Index(f)) / mean - 1));
     }
@@ -295,18 +335,29 @@ TEST(Inception, SaysWhatIsWrongWithAFile) {
   const auto refusal = [&](const std::string& source) {
     write_inception(folder / "net.pt", source, kernel);
     const std::string message = input_error([&] { InceptionFeatures network(folder / "net.pt"); });
-    EXPECT_TRUE(message.starts_with((folder / "net.pt") + ": ") && test::is_one_line(message)) << message;
+    EXPECT_TRUE(message.starts_with((folder / "net.pt") + ": ") && test::is_one_line(message))
+        << message;
     return message;
   };
   EXPECT_NE(refusal("def forward(self, x):\n    return torch.conv2d(x, self.kernel)\n")
                 .find("forward: gives the shape [1, 5, 293, 293], expected [1,F] or [1,F,1,1]"),
             std::string::npos);
-  EXPECT_NE(refusal("def forward(self, x):\n    return [x]\n").find("forward: gives a "), std::string::npos);
-  EXPECT_NE(refusal("def forward(self, x):\n    return x.view([1, 7])\n").find("forward: "), std::string::npos);
-  EXPECT_NE(refusal("def features(self, x):\n    return x\n").find("forward: the module has no such method"), std::string::npos);
+  EXPECT_NE(refusal("def forward(self, x):\n    return [x]\n").find("forward: gives a "),
+            std::string::npos);
+  EXPECT_NE(refusal("def forward(self, x):\n    return x.view([1, 7])\n").find("forward: "),
+            std::string::npos);
+  EXPECT_NE(refusal("def features(self, x):\n    return x\n")
+                .find("forward: the module has no such method"),
+            std::string::npos);
   body::test::write_text(folder / "text.pt", "no script");
-  EXPECT_NE(input_error([&] { InceptionFeatures network(folder / "text.pt"); }).find("not a TorchScript file"), std::string::npos);
-  EXPECT_NE(input_error([&] { InceptionFeatures network(folder / "none.pt"); }).find("none.pt: cannot open"), std::string::npos);
+  EXPECT_NE(input_error([&] {
+              InceptionFeatures network(folder / "text.pt");
+            }).find("not a TorchScript file"),
+            std::string::npos);
+  EXPECT_NE(input_error([&] {
+              InceptionFeatures network(folder / "none.pt");
+            }).find("none.pt: cannot open"),
+            std::string::npos);
 }
 
 }  // namespace

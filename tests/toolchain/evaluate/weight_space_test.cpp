@@ -1,5 +1,5 @@
-// The linear algebra of a population's weights against populations whose answer is known in closed form: members that are a mean and a
-// known mixture of known directions.
+// The linear algebra of a population's weights against populations whose answer is known in closed
+// form: members that are a mean and a known mixture of known directions.
 #include "toolchain/evaluate/weight_space.h"
 
 #include <gtest/gtest.h>
@@ -20,12 +20,14 @@ using tests::make_test_body;
 RowMatrix hadamard_rows(size_t count) {
   RowMatrix rows(count, 8);
   for (size_t k = 0; k < count; ++k) {
-    for (size_t d = 0; d < 8; ++d) rows(k, d) = (std::popcount((k + 1) & d) % 2 == 0 ? 1 : -1) / std::sqrt(8.0);
+    for (size_t d = 0; d < 8; ++d)
+      rows(k, d) = (std::popcount((k + 1) & d) % 2 == 0 ? 1 : -1) / std::sqrt(8.0);
   }
   return rows;
 }
 
-// Eight members whose coordinates along three directions have mean 0 and are uncorrelated: variances 9, 4 and 1.
+// Eight members whose coordinates along three directions have mean 0 and are uncorrelated:
+// variances 9, 4 and 1.
 RowMatrix known_members() {
   const RowMatrix columns = hadamard_rows(3) * std::sqrt(8.0);
   const Eigen::Vector3d deviation(3, 2, 1);
@@ -44,8 +46,10 @@ TEST(PrincipalBasis, KnowsTheSpectrumOfAKnownMixture) {
   EXPECT_EQ(directions_for(basis.variance(), 0.99), 3u);
   EXPECT_NEAR(participation_ratio(basis.variance()), 14.0 * 14 / (81 + 16 + 1), 1e-12);
   const RowMatrix directions = basis.directions(3);
-  EXPECT_LT((directions * directions.transpose() - RowMatrix::Identity(3, 3)).cwiseAbs().maxCoeff(), 1e-12);
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(std::abs(directions.row(k).dot(hadamard_rows(3).row(k))), 1, 1e-12);
+  EXPECT_LT((directions * directions.transpose() - RowMatrix::Identity(3, 3)).cwiseAbs().maxCoeff(),
+            1e-12);
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(std::abs(directions.row(k).dot(hadamard_rows(3).row(k))), 1, 1e-12);
 }
 
 TEST(PrincipalBasis, ProjectsWhatItSpansOntoItself) {
@@ -54,7 +58,8 @@ TEST(PrincipalBasis, ProjectsWhatItSpansOntoItself) {
   const RowVector inside = 0.5 * hadamard_rows(3).row(0) - 7 * hadamard_rows(3).row(2);
   const Eigen::VectorXd coordinates = basis.coordinates(inside);
   EXPECT_LT((basis.combine(coordinates, 3) - inside).norm(), 1e-12);
-  EXPECT_LT((basis.combine(coordinates, 99) - inside).norm(), 1e-12) << "a rank beyond the basis is all of it";
+  EXPECT_LT((basis.combine(coordinates, 99) - inside).norm(), 1e-12)
+      << "a rank beyond the basis is all of it";
   EXPECT_NEAR((basis.combine(coordinates, 1) - 0.5 * hadamard_rows(3).row(0)).norm(), 0, 1e-12);
   EXPECT_EQ(basis.combine(coordinates, 0).norm(), 0);
 }
@@ -119,7 +124,8 @@ TEST(Standardisation, GivesEveryTokenAUnitOfVarianceAValue) {
   const RowMatrix z = standardisation.standardise(members);
   EXPECT_NEAR(z.leftCols(3).squaredNorm() / (8 * double(standardisation.varying(0))), 1, 1e-12);
   EXPECT_NEAR(z.rightCols(5).squaredNorm() / (8 * double(standardisation.varying(1))), 1, 1e-12);
-  for (int m = 0; m < 8; ++m) EXPECT_LT((standardisation.restore(z.row(m)) - members.row(m)).norm(), 1e-12);
+  for (int m = 0; m < 8; ++m)
+    EXPECT_LT((standardisation.restore(z.row(m)) - members.row(m)).norm(), 1e-12);
 }
 
 TEST(WeightSpace, DistancesAreRootMeanSquares) {
@@ -150,7 +156,8 @@ TEST(WeightSpace, TokensAreAnAvatarsConvolutionsAndItsShape) {
   std::vector<float> storage(weights.size());
   const Avatar same = with_weights(avatar, weights, storage);
   for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
-    EXPECT_TRUE(std::ranges::equal(same.network.layers[i].weights, avatar.network.layers[i].weights));
+    EXPECT_TRUE(
+        std::ranges::equal(same.network.layers[i].weights, avatar.network.layers[i].weights));
     EXPECT_TRUE(std::ranges::equal(same.network.layers[i].bias, avatar.network.layers[i].bias));
   }
   EXPECT_TRUE(std::ranges::equal(same.shape, avatar.shape));

@@ -1,4 +1,5 @@
-// The autoencoder of variant `latent`: its shapes, its loss against the formulas in double, and that it learns to give members back.
+// The autoencoder of variant `latent`: its shapes, its loss against the formulas in double, and
+// that it learns to give members back.
 #include "toolchain/generate/autoencoder.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +19,9 @@ constexpr size_t kWidth = 300;  // a picture of 24 x 24, with 276 values of padd
 
 RowMatrix random_rows(Eigen::Index rows, Eigen::Index columns, uint64_t seed) {
   RowMatrix out(rows, columns);
-  for (Eigen::Index r = 0; r < rows; ++r) out.row(r) = to_rows(draw_noise(seed, 1, static_cast<uint64_t>(r), columns).unsqueeze(0)).row(0);
+  for (Eigen::Index r = 0; r < rows; ++r)
+    out.row(r) =
+        to_rows(draw_noise(seed, 1, static_cast<uint64_t>(r), columns).unsqueeze(0)).row(0);
   return out;
 }
 
@@ -38,14 +41,18 @@ TEST(Autoencoder, FoldsAMemberIntoAMapOfAnEighth) {
   ASSERT_EQ(latents.cols(), 18);
   const RowMatrix back = autoencoder.decode(latents);
   ASSERT_EQ(back.cols(), static_cast<Eigen::Index>(kWidth));
-  // A member does not depend on those beside it, and a token is a row of the map with all of its channels.
+  // A member does not depend on those beside it, and a token is a row of the map with all of its
+  // channels.
   EXPECT_LT((autoencoder.encode(z.bottomRows(1)) - latents.bottomRows(1)).norm(), 1e-5);
   EXPECT_LT((autoencoder.decode(latents.bottomRows(1)) - back.bottomRows(1)).norm(), 1e-4);
   const torch::Tensor map = autoencoder.posterior(to_tensor(z.topRows(1))).mean;
-  for (const auto& [row, channel, column] : {std::array{0, 0, 0}, std::array{1, 1, 2}, std::array{2, 0, 1}}) {
-    EXPECT_NEAR(latents(0, row * 6 + channel * 3 + column), map[0][channel][row][column].item<double>(), 1e-5);
+  for (const auto& [row, channel, column] :
+       {std::array{0, 0, 0}, std::array{1, 1, 2}, std::array{2, 0, 1}}) {
+    EXPECT_NEAR(latents(0, row * 6 + channel * 3 + column),
+                map[0][channel][row][column].item<double>(), 1e-5);
   }
-  EXPECT_LT((to_rows(autoencoder.reconstruct(map)) - back.topRows(1)).norm(), 1e-4) << "decode undoes encode's order";
+  EXPECT_LT((to_rows(autoencoder.reconstruct(map)) - back.topRows(1)).norm(), 1e-4)
+      << "decode undoes encode's order";
 }
 
 TEST(Autoencoder, WholePicturesNeedNoPadding) {
@@ -63,10 +70,13 @@ TEST(Autoencoder, LossIsTheErrorAndTheDivergenceOfThePosterior) {
   const RowMatrix training = random_rows(4, kWidth, 4);
   auto autoencoder = std::make_shared<Autoencoder>(kWidth, settings().autoencoder, 5);
   const auto loss = [&](double kl_weight, Share share) {
-    return Autoencoding(autoencoder, settings(kl_weight), training, RowMatrix(0, kWidth)).loss(0, share).item<double>();
+    return Autoencoding(autoencoder, settings(kl_weight), training, RowMatrix(0, kWidth))
+        .loss(0, share)
+        .item<double>();
   };
   const Autoencoder::Posterior posterior = autoencoder->posterior(to_tensor(training));
-  const RowMatrix mean = to_rows(posterior.mean.reshape({4, 18})), log_variance = to_rows(posterior.log_variance.reshape({4, 18}));
+  const RowMatrix mean = to_rows(posterior.mean.reshape({4, 18})),
+                  log_variance = to_rows(posterior.log_variance.reshape({4, 18}));
   double divergence = 0;
   for (Eigen::Index i = 0; i < mean.size(); ++i) {
     const double m = mean.data()[i], v = std::exp(log_variance.data()[i]);
@@ -83,10 +93,17 @@ TEST(Autoencoder, LearnsToGiveMembersBack) {
   const RowMatrix members = random_rows(5, kWidth, 6);
   auto autoencoder = std::make_shared<Autoencoder>(kWidth, settings().autoencoder, 7);
   Autoencoding autoencoding(autoencoder, settings(1e-4), members, members);
-  EXPECT_NEAR(autoencoding.validation_loss(), 1, 0.2) << "members of unit scale, and a network that knows nothing";
+  EXPECT_NEAR(autoencoding.validation_loss(), 1, 0.2)
+      << "members of unit scale, and a network that knows nothing";
   ProcessGroup alone({}, 1);
-  FlatTraining training{.title = "test", .run = "test", .checkpoint = testing::TempDir() + "autoencoder_test.safetensors", .batch = 4};
-  training.schedule = {.peak = 5e-3, .ramp_iterations = 10, .floor_fraction = 0.02, .budget = {.iterations = 400, .seconds = 0}};
+  FlatTraining training{.title = "test",
+                        .run = "test",
+                        .checkpoint = testing::TempDir() + "autoencoder_test.safetensors",
+                        .batch = 4};
+  training.schedule = {.peak = 5e-3,
+                       .ramp_iterations = 10,
+                       .floor_fraction = 0.02,
+                       .budget = {.iterations = 400, .seconds = 0}};
   training.quiet = true;
   FlatTrainer trainer(autoencoding, alone, training, [](const char*, const FlatProgress&) {});
   trainer.run();
@@ -94,7 +111,9 @@ TEST(Autoencoder, LearnsToGiveMembersBack) {
   const double error = autoencoding.validation_loss();
   std::printf("  mean square error %.3f\n", error);
   EXPECT_LT(error, 0.1);
-  EXPECT_LT((autoencoder->decode(autoencoder->encode(members)) - members).squaredNorm() / static_cast<double>(members.size()), 0.1);
+  EXPECT_LT((autoencoder->decode(autoencoder->encode(members)) - members).squaredNorm() /
+                static_cast<double>(members.size()),
+            0.1);
 }
 
 }  // namespace

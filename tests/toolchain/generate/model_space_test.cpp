@@ -1,4 +1,5 @@
-// What a denoiser sees of a population: unit scale, nothing lost where the variant promises it, and only the training part learnt from.
+// What a denoiser sees of a population: unit scale, nothing lost where the variant promises it, and
+// only the training part learnt from.
 #include "toolchain/generate/model_space.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,10 @@ RowMatrix normal_rows(Eigen::Index rows, Eigen::Index columns, uint64_t seed) {
   uint64_t state = seed;
   for (Eigen::Index i = 0; i < out.size(); ++i) {
     double sum = -6;
-    for (int k = 0; k < 12; ++k) sum += static_cast<double>((state = state * 6364136223846793005u + 1442695040888963407u) >> 40) * 0x1p-24;
+    for (int k = 0; k < 12; ++k)
+      sum +=
+          static_cast<double>((state = state * 6364136223846793005u + 1442695040888963407u) >> 40) *
+          0x1p-24;
     out.data()[i] = sum;
   }
   return out;
@@ -50,7 +54,8 @@ TEST(ModelSpace, EveryVariantHasUnitScaleAndGivesTrainingMembersBack) {
     ASSERT_EQ(static_cast<size_t>(values.cols()), space.size());
     EXPECT_NEAR(mean_square(values, space.dimension()), 1, 1e-9) << to_string(variant);
     for (Eigen::Index m = 0; m < training.rows(); ++m) {
-      EXPECT_LT((space.decode(values.row(m)) - training.row(m)).cwiseAbs().maxCoeff(), 1e-10) << to_string(variant);
+      EXPECT_LT((space.decode(values.row(m)) - training.row(m)).cwiseAbs().maxCoeff(), 1e-10)
+          << to_string(variant);
     }
     EXPECT_EQ(variant_from_string(to_string(variant)), variant);
   }
@@ -68,7 +73,8 @@ TEST(ModelSpace, CutsTokensAsTheVariantSays) {
   const ModelSpace basis(training, kTokens, {.variant = Variant::kBasis, .rank = 5});
   EXPECT_EQ(basis.token_sizes(), (std::vector<size_t>{5, 5, 3}));
   const ModelSpace whole(training, kTokens, {.variant = Variant::kBasis, .rank = 64});
-  EXPECT_EQ(whole.token_sizes(), (std::vector<size_t>{11, 11, 3})) << "twelve members span eleven directions";
+  EXPECT_EQ(whole.token_sizes(), (std::vector<size_t>{11, 11, 3}))
+      << "twelve members span eleven directions";
 }
 
 TEST(ModelSpace, BasisKeepsWhatItSpansOfOthers) {
@@ -78,7 +84,8 @@ TEST(ModelSpace, BasisKeepsWhatItSpansOfOthers) {
   const RowVector once = space.decode(space.encode(other).row(0));
   EXPECT_GT((once - other.row(0)).norm(), 1) << "a stranger lies outside the span";
   const RowMatrix projected = once;
-  EXPECT_LT((space.decode(space.encode(projected).row(0)) - once).norm(), 1e-9) << "its projection lies inside";
+  EXPECT_LT((space.decode(space.encode(projected).row(0)) - once).norm(), 1e-9)
+      << "its projection lies inside";
   EXPECT_EQ(once[7], 0.125) << "a dead value stays what all members have";
 }
 

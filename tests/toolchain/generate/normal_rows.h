@@ -11,7 +11,9 @@ namespace figurine::tests {
 inline generate::RowMatrix normal_rows(Eigen::Index rows, Eigen::Index columns, uint64_t seed) {
   std::vector<float> values(static_cast<size_t>(rows * columns));
   fill_normal(seed, 0, values);
-  return Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(values.data(), rows, columns).cast<double>();
+  return Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+             values.data(), rows, columns)
+      .cast<double>();
 }
 
 }  // namespace figurine::tests

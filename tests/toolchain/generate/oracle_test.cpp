@@ -44,12 +44,15 @@ BruteForce brute_force(const RowMatrix& members, const RowVector& z, double lamb
 
 // A place on the way of a member to noise.
 RowVector noised(const RowMatrix& members, const NoiseLevel& level, uint64_t seed) {
-  return level.alpha * members.row(Eigen::Index(seed) % members.rows()) + level.sigma * normal_rows(1, members.cols(), seed + 1000).row(0);
+  return level.alpha * members.row(Eigen::Index(seed) % members.rows()) +
+         level.sigma * normal_rows(1, members.cols(), seed + 1000).row(0);
 }
 
 TEST(MemberOracle, EqualsBruteForce) {
-  LargestError x0_error("prediction of the member oracle"), entropy_error("posterior entropy in nats");
-  for (const auto& [count, dimension] : std::initializer_list<std::pair<int, int>>{{1, 3}, {5, 2}, {20, 200}, {100, 2000}}) {
+  LargestError x0_error("prediction of the member oracle"),
+      entropy_error("posterior entropy in nats");
+  for (const auto& [count, dimension] :
+       std::initializer_list<std::pair<int, int>>{{1, 3}, {5, 2}, {20, 200}, {100, 2000}}) {
     const RowMatrix members = normal_rows(count, dimension, uint64_t(count));
     const MemberOracle oracle(members);
     for (double lambda = -12; lambda <= 12; lambda += 0.5) {
@@ -57,7 +60,8 @@ TEST(MemberOracle, EqualsBruteForce) {
       const RowVector z = noised(members, level, uint64_t(lambda + 12));
       const BruteForce truth = brute_force(members, z, lambda);
       const RowVector x0 = oracle.predict(z, level);
-      for (Eigen::Index d = 0; d < x0.size(); ++d) x0_error.add(double(x0[d] - truth.x0[size_t(d)]));
+      for (Eigen::Index d = 0; d < x0.size(); ++d)
+        x0_error.add(double(x0[d] - truth.x0[size_t(d)]));
       entropy_error.add(double(oracle.posterior(z, level).entropy_nats - truth.entropy_nats));
     }
   }
@@ -73,9 +77,10 @@ TEST(MemberOracle, KnowsNothingAtTheNoisyEndAndAllAtTheCleanEnd) {
   for (const double u : {0.0, 0.25, 0.5, 0.75, 1.0}) {
     const NoiseLevel level = schedule.level(u);
     double entropy = 0;
-    for (uint64_t seed = 0; seed < 50; ++seed) entropy += oracle.posterior(noised(members, level, seed), level).entropy_nats / 50;
-    std::printf("u %.2f, D x SNR %9.3g: mean posterior entropy %.4f nats of %.4f\n", u, kDimension * snr(level), entropy,
-                std::log(double(kMembers)));
+    for (uint64_t seed = 0; seed < 50; ++seed)
+      entropy += oracle.posterior(noised(members, level, seed), level).entropy_nats / 50;
+    std::printf("u %.2f, D x SNR %9.3g: mean posterior entropy %.4f nats of %.4f\n", u,
+                kDimension * snr(level), entropy, std::log(double(kMembers)));
     if (u == 0) {
       EXPECT_NEAR(entropy, std::log(double(kMembers)), 0.1);
     }
@@ -95,18 +100,21 @@ TEST(MemberOracle, IsSoundAtEveryLevel) {
   RowMatrix members = normal_rows(4, 300, 4);
   members.row(3) = members.row(0);  // twins share what one of them had
   const MemberOracle oracle(members);
-  for (const double lambda : {-double(INFINITY), -700.0, -400.0, -50.0, 0.0, 50.0, 400.0, 700.0, double(INFINITY)}) {
+  for (const double lambda :
+       {-double(INFINITY), -700.0, -400.0, -50.0, 0.0, 50.0, 400.0, 700.0, double(INFINITY)}) {
     const NoiseLevel level = noise_level(lambda);
     for (const double size : {0.0, 1.0, 1e6}) {
       const RowVector z = size * members.row(0);
       const Posterior posterior = oracle.posterior(z, level);
       EXPECT_NEAR(posterior.weights.sum(), 1, 1e-14) << lambda << " " << size;
       EXPECT_EQ(posterior.weights[0], posterior.weights[3]);
-      EXPECT_TRUE(posterior.entropy_nats >= 0 && posterior.entropy_nats <= std::log(4.0) + 1e-14) << lambda << " " << size;
+      EXPECT_TRUE(posterior.entropy_nats >= 0 && posterior.entropy_nats <= std::log(4.0) + 1e-14)
+          << lambda << " " << size;
       EXPECT_TRUE(oracle.predict(z, level).allFinite()) << lambda << " " << size;
     }
   }
-  EXPECT_NEAR(oracle.posterior(members.row(0), noise_level(INFINITY)).entropy_nats, std::log(2.0), 1e-15);
+  EXPECT_NEAR(oracle.posterior(members.row(0), noise_level(INFINITY)).entropy_nats, std::log(2.0),
+              1e-15);
 }
 
 TEST(GaussianOracle, FlowFollowsThePrediction) {
@@ -119,9 +127,12 @@ TEST(GaussianOracle, FlowFollowsThePrediction) {
   LargestError error("change of z / sigma over x0");
   for (double lambda = -4; lambda <= 4; lambda += 0.25) {
     constexpr double kStep = 1e-4;
-    const NoiseLevel here = noise_level(lambda), before = noise_level(lambda - kStep), after = noise_level(lambda + kStep);
-    const RowVector change = oracle.flow(z, here, after) / after.sigma - oracle.flow(z, here, before) / before.sigma;
-    const RowVector slope = change / (after.alpha / after.sigma - before.alpha / before.sigma), x0 = oracle.predict(z, here);
+    const NoiseLevel here = noise_level(lambda), before = noise_level(lambda - kStep),
+                     after = noise_level(lambda + kStep);
+    const RowVector change =
+        oracle.flow(z, here, after) / after.sigma - oracle.flow(z, here, before) / before.sigma;
+    const RowVector slope = change / (after.alpha / after.sigma - before.alpha / before.sigma),
+                    x0 = oracle.predict(z, here);
     for (Eigen::Index d = 0; d < 4; ++d) error.add((slope[d] - x0[d]) / (1 + std::abs(x0[d])));
   }
   EXPECT_LE(error.largest(), 1e-6);

@@ -1,4 +1,5 @@
-// A trained sampler as a package: the device's integers against the trainer's floats, what all avatars share, ranges, golden seeds.
+// A trained sampler as a package: the device's integers against the trainer's floats, what all
+// avatars share, ranges, golden seeds.
 #include "toolchain/generate/pack_sampler.h"
 
 #include <gtest/gtest.h>
@@ -35,15 +36,23 @@ class PackSampler : public testing::Test {
     fs::remove_all(folder());
     fs::create_directories(folder());
     tests::write_people(path("people.fgn"));
-    ASSERT_TRUE(ports::write_file_atomically(path("body.fgn"), tests::make_test_body().bytes.bytes()).ok());
-    SamplerRequest request{.population = path("people.fgn"), .run = path("run"), .settings = {}, .command = "test", .quiet = true};
+    ASSERT_TRUE(
+        ports::write_file_atomically(path("body.fgn"), tests::make_test_body().bytes.bytes()).ok());
+    SamplerRequest request{.population = path("people.fgn"),
+                           .run = path("run"),
+                           .settings = {},
+                           .command = "test",
+                           .quiet = true};
     request.settings.space = {.variant = Variant::kBasis, .rank = 8};
-    request.settings.shape = {.token_sizes = {}, .d_model = 32, .blocks = 2, .heads = 4, .feed_forward = 64};
-    request.settings.batch = 8, request.settings.schedule.peak = 3e-3, request.settings.schedule.ramp_iterations = 5;
+    request.settings.shape = {
+        .token_sizes = {}, .d_model = 32, .blocks = 2, .heads = 4, .feed_forward = 64};
+    request.settings.batch = 8, request.settings.schedule.peak = 3e-3,
+    request.settings.schedule.ramp_iterations = 5;
     request.settings.ema = 0.9;
     request.settings.schedule.budget = {.iterations = 200, .seconds = 0};
     train_sampler(request);
-    request.run = path("layer"), request.settings.space.variant = Variant::kLayer, request.settings.schedule.budget.iterations = 2;
+    request.run = path("layer"), request.settings.space.variant = Variant::kLayer,
+    request.settings.schedule.budget.iterations = 2;
     train_sampler(request);
   }
   static void TearDownTestSuite() { fs::remove_all(folder()); }
@@ -53,7 +62,9 @@ class PackSampler : public testing::Test {
     return folder;
   }
   static std::string path(const std::string& name) { return (folder() / name).string(); }
-  static PackSamplerOptions options() { return {.run = path("run"), .body = path("body.fgn"), .steps = 8, .quiet = true}; }
+  static PackSamplerOptions options() {
+    return {.run = path("run"), .body = path("body.fgn"), .steps = 8, .quiet = true};
+  }
 
   static std::string refusal(const PackSamplerOptions& options) {
     try {
@@ -77,7 +88,8 @@ double relative_error(std::span<const float> a, std::span<const float> b) {
 // Matrices of 127 levels: every product is off by a part in a few hundred.
 TEST_F(PackSampler, TheDevicesPredictionIsTheTrainersButForTheRoundingOfMatrices) {
   const TrainedSampler trained = TrainedSampler::open(path("run"));
-  const std::vector<Quantisation> ranges(trained.population->package.population().network.layers.size());
+  const std::vector<Quantisation> ranges(
+      trained.population->package.population().network.layers.size());
   const QuantisedSampler quantised(trained, ranges, "people");
   const auto device = DeviceTransformer::create(quantised.view());
   ASSERT_TRUE(device.ok());
@@ -88,7 +100,10 @@ TEST_F(PackSampler, TheDevicesPredictionIsTheTrainersButForTheRoundingOfMatrices
     (*device)->predict(z, lambda, x0);
     const torch::NoGradGuard no_gradient;
     const torch::Tensor out =
-        trained.transformer->forward(torch::from_blob(z.data(), {1, static_cast<int64_t>(size)}), torch::full({1}, lambda)).contiguous();
+        trained.transformer
+            ->forward(torch::from_blob(z.data(), {1, static_cast<int64_t>(size)}),
+                      torch::full({1}, lambda))
+            .contiguous();
     const double error = relative_error(x0, {out.const_data_ptr<float>(), size});
     std::printf("  lambda %g: relative error %.2g\n", static_cast<double>(lambda), error);
     EXPECT_LT(error, 0.03);
@@ -103,7 +118,8 @@ TEST_F(PackSampler, DirectionsAreTheSpacesButForTheirRounding) {
   for (Eigen::Index m = 0; m < trained.training.rows(); ++m) {
     const evaluate::RowVector values = trained.training.row(m);
     decode_weights(quantised.view(), {values.data(), static_cast<size_t>(values.size())}, weights);
-    const evaluate::RowVector truth = trained.space->decode(values), mean = trained.space->standardisation().mean();
+    const evaluate::RowVector truth = trained.space->decode(values),
+                              mean = trained.space->standardisation().mean();
     double error = 0, power = 0;
     for (Eigen::Index j = 0; j < truth.size(); ++j) {
       error += std::pow(double{weights[static_cast<size_t>(j)]} - truth[j], 2);
@@ -130,7 +146,8 @@ TEST_F(PackSampler, ThePackageSaysWhatAllItsAvatarsShare) {
   for (const Quantisation& value : sampler.values) EXPECT_GT(value.scale, 0);
   bool says_population = false;
   for (const KeyValue& setting : opened->provenance().settings) {
-    says_population = says_population || (setting.key == "population" && setting.value == format_hash(sampler.population_hash));
+    says_population = says_population || (setting.key == "population" &&
+                                          setting.value == format_hash(sampler.population_hash));
   }
   EXPECT_TRUE(says_population);
 }
@@ -145,7 +162,10 @@ TEST_F(PackSampler, GoldenSeedsAreWhatADeviceSamples) {
   ASSERT_TRUE(device.ok());
   for (const GoldenSeed& golden : sampler.golden_seeds) {
     SampledAvatar person;
-    ASSERT_TRUE((*device)->sample({.seed = golden.seed, .steps = golden.steps, .method = golden.method}, person).ok());
+    ASSERT_TRUE(
+        (*device)
+            ->sample({.seed = golden.seed, .steps = golden.steps, .method = golden.method}, person)
+            .ok());
     EXPECT_EQ(hash_weights(person.avatar().fixed_point, person.avatar().shape), golden.hash);
   }
   EXPECT_NE(sampler.golden_seeds[0].hash, sampler.golden_seeds[1].hash);
@@ -158,20 +178,25 @@ TEST_F(PackSampler, SeedsOfTheDeviceAreSeedsOfTheTrainersFloats) {
   const auto device = AvatarSampler::create(opened->sampler());
   ASSERT_TRUE(device.ok());
   const TrainedSampler trained = TrainedSampler::open(path("run"));
-  const evaluate::RowMatrix floats = verify::draw_weights(trained, {.first_seed = 3, .count = 2, .steps = 8});
-  const evaluate::RowMatrix sampled = verify::sample_weights(opened->sampler(), {.first_seed = 3, .count = 2, .quiet = true});
+  const evaluate::RowMatrix floats =
+      verify::draw_weights(trained, {.first_seed = 3, .count = 2, .steps = 8});
+  const evaluate::RowMatrix sampled =
+      verify::sample_weights(opened->sampler(), {.first_seed = 3, .count = 2, .quiet = true});
   ASSERT_EQ(sampled.cols(), floats.cols());
   for (uint64_t seed = 3; seed < 5; ++seed) {
     SampledAvatar person;
     ASSERT_TRUE((*device)->sample({.seed = seed}, person).ok());
     std::vector<double> weights(static_cast<size_t>(floats.cols()));
     evaluate::read_weights(person.avatar(), weights);
-    EXPECT_TRUE(std::ranges::equal(weights, sampled.row(static_cast<Eigen::Index>(seed - 3)))) << "as evaluations see them";
+    EXPECT_TRUE(std::ranges::equal(weights, sampled.row(static_cast<Eigen::Index>(seed - 3))))
+        << "as evaluations see them";
     const evaluate::RowVector mean = trained.space->standardisation().mean();
     const auto row = floats.row(static_cast<Eigen::Index>(seed - 3));
     const double power = (row - mean).squaredNorm();
-    const double error = (Eigen::Map<const evaluate::RowVector>(weights.data(), row.size()) - row).squaredNorm();
-    std::printf("  seed %llu: relative error %.3f\n", static_cast<unsigned long long>(seed), std::sqrt(error / power));
+    const double error =
+        (Eigen::Map<const evaluate::RowVector>(weights.data(), row.size()) - row).squaredNorm();
+    std::printf("  seed %llu: relative error %.3f\n", static_cast<unsigned long long>(seed),
+                std::sqrt(error / power));
     EXPECT_LT(std::sqrt(error / power), 0.1);
   }
 }
@@ -192,7 +217,9 @@ TEST_F(PackSampler, RefusesWhatDoesNotFit) {
   EXPECT_NE(refusal(bad).find("--body"), std::string::npos) << refusal(bad);
   bad.body = path("people.fgn");
   EXPECT_NE(refusal(bad).find("people.fgn"), std::string::npos) << refusal(bad);
-  ASSERT_TRUE(ports::write_file_atomically(path("other.fgn"), tests::make_test_body({.seed = 2}).bytes.bytes()).ok());
+  ASSERT_TRUE(ports::write_file_atomically(path("other.fgn"),
+                                           tests::make_test_body({.seed = 2}).bytes.bytes())
+                  .ok());
   bad.body = path("other.fgn");
   EXPECT_NE(refusal(bad).find("stands on body"), std::string::npos) << refusal(bad);
   bad = options();
@@ -207,8 +234,9 @@ TEST_F(PackSampler, MeasuringTheSamplingGivesOrdersAndAFloor) {
   const Result<Package> opened = Package::open(bytes.bytes(), "sampler");
   ASSERT_TRUE(opened.ok());
   const tests::SyntheticBody body = tests::make_test_body();
-  const nlohmann::json report = verify::measure_sampling_error(TrainedSampler::open(path("run")), opened->sampler(), *body.package,
-                                                               {.evaluations = {1, 50, 250}, .seeds = 2, .quiet = true});
+  const nlohmann::json report = verify::measure_sampling_error(
+      TrainedSampler::open(path("run")), opened->sampler(), *body.package,
+      {.evaluations = {1, 50, 250}, .seeds = 2, .quiet = true});
   EXPECT_EQ(report.at("rows").size(), 3u * 2 * 3);
   EXPECT_NEAR(report.at("order").at("oracle, float64").at("ddim").get<double>(), 1, 0.2);
   EXPECT_GT(report.at("order").at("network, float32").at("dpmpp2m").get<double>(), 1.5);
@@ -216,7 +244,8 @@ TEST_F(PackSampler, MeasuringTheSamplingGivesOrdersAndAFloor) {
 }
 
 TEST(PooledPoseStatistics, AreThoseOfAllTrainingMembersTogether) {
-  const std::string path = (fs::temp_directory_path() / ("pooled_pose_" + std::to_string(getpid()) + ".fgn")).string();
+  const std::string path =
+      (fs::temp_directory_path() / ("pooled_pose_" + std::to_string(getpid()) + ".fgn")).string();
   tests::write_people(path);
   const train::PackageFile file = train::open_package(path, PackageKind::kPopulation);
   fs::remove(path);

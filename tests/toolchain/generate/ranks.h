@@ -1,5 +1,5 @@
-// Ranks as processes on this machine. They are forked before anything of LibTorch has run in the test's own process, which must stay so: a
-// pool of threads does not survive a fork.
+// Ranks as processes on this machine. They are forked before anything of LibTorch has run in the
+// test's own process, which must stay so: a pool of threads does not survive a fork.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,7 +20,9 @@
 
 namespace figurine::tests {
 
-inline double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+inline double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 // A TCP port that nobody listens on now.
 inline uint16_t free_port() {
@@ -36,7 +38,8 @@ inline uint16_t free_port() {
 
 class Ranks {
  public:
-  // What a rank does; returns what it has to tell. Exceptions are told as "PeerLost: ...", "Interrupted: ...", "InputError: ...".
+  // What a rank does; returns what it has to tell. Exceptions are told as "PeerLost: ...",
+  // "Interrupted: ...", "InputError: ...".
   using Body = std::function<std::string(const generate::RankPlace&)>;
 
   Ranks(int size, const Body& body) : Ranks(size, size, body) {}
@@ -50,7 +53,8 @@ class Ranks {
       if (pid == 0) {
         dup2(ends[1], STDERR_FILENO);  // what it says counts as told, too
         const std::string text = told_by(body, {rank, size, "127.0.0.1", port});
-        _exit(write(ends[1], text.data(), text.size()) == static_cast<ssize_t>(text.size()) ? 0 : 1);
+        _exit(write(ends[1], text.data(), text.size()) == static_cast<ssize_t>(text.size()) ? 0
+                                                                                            : 1);
       }
       close(ends[1]);
       children_.push_back({pid, ends[0]});
@@ -86,13 +90,15 @@ class Ranks {
     waitpid(child.pid, &status, 0);
     close(child.pipe);
     child.pipe = -1;
-    if (WIFSIGNALED(status) && WTERMSIG(status) != SIGKILL) text += " [signal " + std::to_string(WTERMSIG(status)) + "]";
+    if (WIFSIGNALED(status) && WTERMSIG(status) != SIGKILL)
+      text += " [signal " + std::to_string(WTERMSIG(status)) + "]";
     return text;
   }
 
   std::vector<std::string> wait_for_all(double limit_s = 60) {
     std::vector<std::string> all;
-    for (size_t rank = 0; rank < children_.size(); ++rank) all.push_back(wait(static_cast<int>(rank), limit_s));
+    for (size_t rank = 0; rank < children_.size(); ++rank)
+      all.push_back(wait(static_cast<int>(rank), limit_s));
     return all;
   }
 

@@ -29,10 +29,16 @@ class SamplerRanks : public testing::Test {
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
   SamplerRequest request(const std::string& run, uint64_t iterations) const {
-    SamplerRequest request{.population = path("people.fgn"), .run = path(run), .settings = {}, .command = "test", .quiet = true};
+    SamplerRequest request{.population = path("people.fgn"),
+                           .run = path(run),
+                           .settings = {},
+                           .command = "test",
+                           .quiet = true};
     request.settings.space = {.variant = Variant::kBasis, .rank = 8, .chunk = 128};
-    request.settings.shape = {.token_sizes = {}, .d_model = 16, .blocks = 1, .heads = 2, .feed_forward = 32};
-    request.settings.batch = 8, request.settings.schedule.peak = 3e-3, request.settings.schedule.ramp_iterations = 5;
+    request.settings.shape = {
+        .token_sizes = {}, .d_model = 16, .blocks = 1, .heads = 2, .feed_forward = 32};
+    request.settings.batch = 8, request.settings.schedule.peak = 3e-3,
+    request.settings.schedule.ramp_iterations = 5;
     request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
     request.rank_timeout_s = 60;
     return request;
@@ -49,7 +55,9 @@ class SamplerRanks : public testing::Test {
     };
   }
 
-  std::vector<std::string> train(int ranks, const SamplerRequest& request) const { return Ranks(ranks, training(request)).wait_for_all(); }
+  std::vector<std::string> train(int ranks, const SamplerRequest& request) const {
+    return Ranks(ranks, training(request)).wait_for_all();
+  }
 
   std::vector<float> checkpoint(const std::string& run, const std::string& tensor) const {
     return train::read_tensor_file(path(run) + "/checkpoint.safetensors").tensors.at(tensor).values;
@@ -58,7 +66,8 @@ class SamplerRanks : public testing::Test {
   // Waits until the run has a checkpoint, so that it is in the middle of its training.
   void wait_for_checkpoint(const std::string& run) const {
     for (int i = 0; i < 3000 && !fs::exists(path(run) + "/run.json"); ++i) usleep(10000);
-    while (nlohmann::json(train::read_json(path(run) + "/run.json")).value("iterations", 0) == 0) usleep(10000);
+    while (nlohmann::json(train::read_json(path(run) + "/run.json")).value("iterations", 0) == 0)
+      usleep(10000);
   }
 
   fs::path folder_;
@@ -73,14 +82,17 @@ Difference difference(const std::vector<float>& a, const std::vector<float>& b) 
   Difference out;
   for (size_t i = 0; i < a.size(); ++i) {
     const double d = std::abs(static_cast<double>(a[i]) - b[i]);
-    out.largest = std::max(out.largest, d), out.rms += d * d, out.size += static_cast<double>(a[i]) * a[i];
+    out.largest = std::max(out.largest, d), out.rms += d * d,
+    out.size += static_cast<double>(a[i]) * a[i];
   }
-  out.rms = std::sqrt(out.rms / static_cast<double>(a.size())), out.size = std::sqrt(out.size / static_cast<double>(a.size()));
+  out.rms = std::sqrt(out.rms / static_cast<double>(a.size())),
+  out.size = std::sqrt(out.size / static_cast<double>(a.size()));
   return out;
 }
 
-// After one iteration AdamW's first moment is a tenth of the gradient. The ranks add the same products as one process, in another order: a
-// sum of n = 8 rows x 128 values of a token differs by rounding alone, sqrt(n) 2^-24 = 2e-6 of the largest gradient at most.
+// After one iteration AdamW's first moment is a tenth of the gradient. The ranks add the same
+// products as one process, in another order: a sum of n = 8 rows x 128 values of a token differs by
+// rounding alone, sqrt(n) 2^-24 = 2e-6 of the largest gradient at most.
 TEST_F(SamplerRanks, GiveTheGradientsOfOneProcess) {
   train(1, request("one", 1));
   for (const int ranks : {2, 3}) {
@@ -89,17 +101,21 @@ TEST_F(SamplerRanks, GiveTheGradientsOfOneProcess) {
     const std::vector<float> whole = checkpoint("one", "first_moment");
     const Difference gradients = difference(whole, checkpoint(run, "first_moment"));
     double largest = 0;
-    for (const float value : whole) largest = std::max(largest, static_cast<double>(std::abs(value)));
-    std::printf("  %d ranks: gradients differ by %.2g of the largest at most\n", ranks, gradients.largest / largest);
+    for (const float value : whole)
+      largest = std::max(largest, static_cast<double>(std::abs(value)));
+    std::printf("  %d ranks: gradients differ by %.2g of the largest at most\n", ranks,
+                gradients.largest / largest);
     EXPECT_GT(largest, 0);
     EXPECT_LT(gradients.largest, 2e-6 * largest);
   }
 }
 
-// AdamW divides a gradient by its own size: where it is rounding alone, the step is as long as any other and may point elsewhere. So no
-// single weight can be promised more than twice the sum of the learning rates; all of them together stay near, because few are like that.
+// AdamW divides a gradient by its own size: where it is rounding alone, the step is as long as any
+// other and may point elsewhere. So no single weight can be promised more than twice the sum of the
+// learning rates; all of them together stay near, because few are like that.
 TEST_F(SamplerRanks, EndWhereOneProcessEnds) {
-  const std::vector<std::string> one = train(1, request("one", 30)), two = train(2, request("two", 30)),
+  const std::vector<std::string> one = train(1, request("one", 30)),
+                                 two = train(2, request("two", 30)),
                                  three = train(3, request("three", 30));
   EXPECT_EQ(two[1], two[0]) << "the ranks' own weights, to the bit";
   EXPECT_EQ(three[1], three[0]);
@@ -107,7 +123,8 @@ TEST_F(SamplerRanks, EndWhereOneProcessEnds) {
   EXPECT_EQ(one[0].rfind("30 ", 0), 0u) << one[0];
   for (const char* run : {"two", "three"}) {
     const Difference weights = difference(checkpoint("one", "weights"), checkpoint(run, "weights"));
-    std::printf("  %s: weights differ by %.2g at most, %.2g rms of %.2g\n", run, weights.largest, weights.rms, weights.size);
+    std::printf("  %s: weights differ by %.2g at most, %.2g rms of %.2g\n", run, weights.largest,
+                weights.rms, weights.size);
     EXPECT_LT(weights.largest, 2 * 30 * 3e-3);
     EXPECT_LT(weights.rms, 2e-5 * weights.size);
   }
@@ -137,13 +154,16 @@ TEST_F(SamplerRanks, GoOnWithTheSameBits) {
     cut.stop_after = stop;
     const std::vector<std::string> told = train(2, cut);
     for (const std::string& text : told)
-      EXPECT_NE(text.find("stopped after " + std::to_string(stop) + " iterations"), std::string::npos) << text;
+      EXPECT_NE(text.find("stopped after " + std::to_string(stop) + " iterations"),
+                std::string::npos)
+          << text;
     cut.resume = true;
   }
   cut.stop_after = 0;
   EXPECT_EQ(train(2, cut), whole);
   EXPECT_EQ(checkpoint("cut", "average"), checkpoint("whole", "average"));
-  for (const std::string& text : train(2, cut)) EXPECT_EQ(text.find("bug"), std::string::npos) << "a finished run: " << text;
+  for (const std::string& text : train(2, cut))
+    EXPECT_EQ(text.find("bug"), std::string::npos) << "a finished run: " << text;
 }
 
 // A run of two ranks may go on with one, and of one with three.
@@ -210,7 +230,8 @@ TEST_F(SamplerRanks, RefuseTogether) {
   SamplerRequest small = request("small", 2);
   small.settings.batch = 1;
   told = train(2, small);
-  for (const std::string& text : told) EXPECT_NE(text.find("a batch of 1 is too small for 2 ranks"), std::string::npos) << text;
+  for (const std::string& text : told)
+    EXPECT_NE(text.find("a batch of 1 is too small for 2 ranks"), std::string::npos) << text;
   EXPECT_FALSE(fs::exists(path("small"))) << "nothing half-made";
 }
 

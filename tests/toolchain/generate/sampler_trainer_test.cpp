@@ -1,4 +1,5 @@
-// The training of a sampler: it learns, it goes on after an interruption with the same bits, it learns from the training part alone.
+// The training of a sampler: it learns, it goes on after an interruption with the same bits, it
+// learns from the training part alone.
 #include "toolchain/generate/sampler_trainer.h"
 
 #include <gtest/gtest.h>
@@ -33,19 +34,28 @@ class SamplerTraining : public testing::Test {
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
-  SamplerRequest request(const std::string& run, Variant variant = Variant::kBasis, uint64_t iterations = 60) const {
-    SamplerRequest request{.population = path("people.fgn"), .run = path(run), .settings = {}, .command = "test", .quiet = true};
+  SamplerRequest request(const std::string& run, Variant variant = Variant::kBasis,
+                         uint64_t iterations = 60) const {
+    SamplerRequest request{.population = path("people.fgn"),
+                           .run = path(run),
+                           .settings = {},
+                           .command = "test",
+                           .quiet = true};
     request.settings.space = {.variant = variant, .rank = 8, .chunk = 128};
-    request.settings.shape = {.token_sizes = {}, .d_model = 16, .blocks = 1, .heads = 2, .feed_forward = 32};
-    request.settings.autoencoder.channels = 2, request.settings.autoencoder.schedule.budget = {.iterations = 40, .seconds = 0};
-    request.settings.batch = 8, request.settings.schedule.peak = 3e-3, request.settings.schedule.ramp_iterations = 5;
+    request.settings.shape = {
+        .token_sizes = {}, .d_model = 16, .blocks = 1, .heads = 2, .feed_forward = 32};
+    request.settings.autoencoder.channels = 2,
+    request.settings.autoencoder.schedule.budget = {.iterations = 40, .seconds = 0};
+    request.settings.batch = 8, request.settings.schedule.peak = 3e-3,
+    request.settings.schedule.ramp_iterations = 5;
     request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
     return request;
   }
 
   std::vector<float> weights(const std::string& run) const {
     std::vector<float> all;
-    for (const auto& [name, tensor] : train::read_tensor_file(path(run) + "/weights.safetensors").tensors) {
+    for (const auto& [name, tensor] :
+         train::read_tensor_file(path(run) + "/weights.safetensors").tensors) {
       all.insert(all.end(), tensor.values.begin(), tensor.values.end());
     }
     return all;
@@ -65,13 +75,16 @@ class SamplerTraining : public testing::Test {
 
 // The loss of predicting the mean is 1, the mean square of a member.
 TEST_F(SamplerTraining, LearnsInEveryVariant) {
-  for (const Variant variant : {Variant::kLayer, Variant::kFlat, Variant::kLatent, Variant::kBasis}) {
+  for (const Variant variant :
+       {Variant::kLayer, Variant::kFlat, Variant::kLatent, Variant::kBasis}) {
     const std::string run = to_string(variant);
     const SamplerResult result = train_sampler(request(run, variant, 250));
-    std::printf("  %s: loss %.3f, validation %.3f\n", run.c_str(), result.loss, result.validation_loss);
+    std::printf("  %s: loss %.3f, validation %.3f\n", run.c_str(), result.loss,
+                result.validation_loss);
     EXPECT_LT(result.loss, 0.75) << run;
     EXPECT_TRUE(std::isfinite(result.validation_loss));
-    for (const char* file : {"run.json", "log.csv", "weights.safetensors", "checkpoint.safetensors"}) {
+    for (const char* file :
+         {"run.json", "log.csv", "weights.safetensors", "checkpoint.safetensors"}) {
       EXPECT_TRUE(fs::exists(path(run) + "/" + file)) << file;
     }
   }
@@ -139,7 +152,9 @@ TEST_F(SamplerTraining, GoesOnWithTheSameBitsFromTheAutoencoder) {
   EXPECT_EQ(train_sampler(cut).weights_hash, whole.weights_hash);
   EXPECT_EQ(weights("cut"), weights("whole"));
   const TrainedSampler sampler = TrainedSampler::open(path("cut"));
-  EXPECT_NEAR(sampler.training.squaredNorm() / static_cast<double>(sampler.training.size()), 1, 1e-9) << "of unit scale";
+  EXPECT_NEAR(sampler.training.squaredNorm() / static_cast<double>(sampler.training.size()), 1,
+              1e-9)
+      << "of unit scale";
   const evaluate::RowVector back = sampler.space->decode(sampler.training.row(0));
   EXPECT_EQ(back.size(), sampler.space->standardisation().mean().size());
   EXPECT_TRUE(back.array().isFinite().all());

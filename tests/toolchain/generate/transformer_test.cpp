@@ -11,7 +11,8 @@
 namespace figurine::generate {
 namespace {
 
-const TransformerShape kSmall{.token_sizes = {5, 3, 2}, .d_model = 16, .blocks = 2, .heads = 4, .feed_forward = 24};
+const TransformerShape kSmall{
+    .token_sizes = {5, 3, 2}, .d_model = 16, .blocks = 2, .heads = 4, .feed_forward = 24};
 
 torch::Tensor random_rows(int64_t rows, int64_t columns, uint64_t seed) {
   return torch::randn({rows, columns}, at::make_generator<at::CPUGeneratorImpl>(seed));
@@ -19,17 +20,20 @@ torch::Tensor random_rows(int64_t rows, int64_t columns, uint64_t seed) {
 
 TEST(Transformer, CountsItsParameters) {
   const int64_t d = 16, block = 4 * d * d + 4 * d + 2 * 24 * d + 24 + d + 4 * d;
-  EXPECT_EQ(parameter_count(kSmall), uint64_t(10 * d + 3 * d + 4 * d + 2 * (d * d + d) + 2 * block + 2 * d + 10 * d + 10));
-  EXPECT_EQ(Transformer(kSmall, 1).weights().numel(), static_cast<int64_t>(parameter_count(kSmall)));
+  EXPECT_EQ(parameter_count(kSmall),
+            uint64_t(10 * d + 3 * d + 4 * d + 2 * (d * d + d) + 2 * block + 2 * d + 10 * d + 10));
+  EXPECT_EQ(Transformer(kSmall, 1).weights().numel(),
+            static_cast<int64_t>(parameter_count(kSmall)));
 }
 
-// The paper's UNet has 598,011 parameters in 15 layers. Its transformer: 12 blocks of 512 and 2048, of which DESIGN counts 650 million, 94
-// % of them in the projections.
+// The paper's UNet has 598,011 parameters in 15 layers. Its transformer: 12 blocks of 512 and 2048,
+// of which DESIGN counts 650 million, 94 % of them in the projections.
 TEST(Transformer, HasThePapersSize) {
   std::vector<int64_t> tokens(15, 0);
   int64_t left = 598011;
   for (size_t l = 0; l < 15; ++l) tokens[l] = l + 1 < 15 ? 598011 / 15 : left, left -= tokens[l];
-  const uint64_t count = parameter_count({.token_sizes = tokens, .d_model = 512, .blocks = 12, .heads = 16, .feed_forward = 2048});
+  const uint64_t count = parameter_count(
+      {.token_sizes = tokens, .d_model = 512, .blocks = 12, .heads = 16, .feed_forward = 2048});
   EXPECT_NEAR(static_cast<double>(count), 650e6, 3e6);
   EXPECT_NEAR(2.0 * 512 * 598011 / static_cast<double>(count), 0.94, 0.005);
 }
@@ -44,21 +48,26 @@ TEST(Transformer, StartsAtTheMeanAndIsRepeatable) {
 // Gradients by central differences, in random directions of all parameters at once.
 TEST(Transformer, GradientsAreThoseOfItsForwardPass) {
   Transformer transformer(kSmall, 3);
-  transformer.weights().add_(0.05 * torch::randn({transformer.weights().numel()}, at::make_generator<at::CPUGeneratorImpl>(9)));
-  const torch::Tensor z = random_rows(3, 10, 1), clean = random_rows(3, 10, 2), lambda = torch::tensor({-3.0, 0.5, 4.0});
+  transformer.weights().add_(0.05 * torch::randn({transformer.weights().numel()},
+                                                 at::make_generator<at::CPUGeneratorImpl>(9)));
+  const torch::Tensor z = random_rows(3, 10, 1), clean = random_rows(3, 10, 2),
+                      lambda = torch::tensor({-3.0, 0.5, 4.0});
   const auto loss = [&] { return torch::mse_loss(transformer.forward(z, lambda), clean); };
   transformer.gradients().zero_();
   loss().backward();
-  const torch::Tensor gradient = transformer.gradients().clone(), start = transformer.weights().clone();
+  const torch::Tensor gradient = transformer.gradients().clone(),
+                      start = transformer.weights().clone();
   for (uint64_t seed = 0; seed < 4; ++seed) {
-    const torch::Tensor direction = torch::randn({start.numel()}, at::make_generator<at::CPUGeneratorImpl>(100 + seed));
+    const torch::Tensor direction =
+        torch::randn({start.numel()}, at::make_generator<at::CPUGeneratorImpl>(100 + seed));
     const double step = 2e-3;
     transformer.weights().copy_(start + step * direction);
     const double up = loss().item<double>();
     transformer.weights().copy_(start - step * direction);
     const double down = loss().item<double>();
     transformer.weights().copy_(start);
-    const double expected = (gradient * direction).sum().item<double>(), found = (up - down) / (2 * step);
+    const double expected = (gradient * direction).sum().item<double>(),
+                 found = (up - down) / (2 * step);
     EXPECT_NEAR(found, expected, 2e-2 * std::abs(expected) + 2e-4);
   }
 }
@@ -76,21 +85,30 @@ TEST(Transformer, RowsOfABatchDoNotSeeEachOther) {
 
 TEST(Transformer, TellsItsTokensAndTimesApart) {
   Transformer transformer(kSmall, 3);
-  transformer.weights().add_(0.1 * torch::randn({transformer.weights().numel()}, at::make_generator<at::CPUGeneratorImpl>(9)));
+  transformer.weights().add_(0.1 * torch::randn({transformer.weights().numel()},
+                                                at::make_generator<at::CPUGeneratorImpl>(9)));
   const torch::Tensor z = random_rows(1, 10, 1);
-  const torch::Tensor a = transformer.forward(z, torch::tensor({-2.0})), b = transformer.forward(z, torch::tensor({-1.9}));
+  const torch::Tensor a = transformer.forward(z, torch::tensor({-2.0})),
+                      b = transformer.forward(z, torch::tensor({-1.9}));
   EXPECT_GT((a - b).abs().max().item<float>(), 1e-4);
   torch::Tensor other = z.clone();
   other[0][9] += 1;  // of the last token
-  EXPECT_GT((transformer.forward(other, torch::tensor({-2.0})) - a).narrow(1, 0, 5).abs().max().item<float>(), 1e-5)
+  EXPECT_GT((transformer.forward(other, torch::tensor({-2.0})) - a)
+                .narrow(1, 0, 5)
+                .abs()
+                .max()
+                .item<float>(),
+            1e-5)
       << "attention joins them";
 }
 
 TEST(Transformer, Bfloat16IsNearFloat) {
   Transformer transformer(kSmall, 3);
-  transformer.weights().add_(0.05 * torch::randn({transformer.weights().numel()}, at::make_generator<at::CPUGeneratorImpl>(9)));
+  transformer.weights().add_(0.05 * torch::randn({transformer.weights().numel()},
+                                                 at::make_generator<at::CPUGeneratorImpl>(9)));
   const torch::Tensor z = random_rows(4, 10, 1), lambda = torch::linspace(-6, 4, 4);
-  const torch::Tensor exact = transformer.forward(z, lambda), rounded = transformer.forward(z, lambda, true);
+  const torch::Tensor exact = transformer.forward(z, lambda),
+                      rounded = transformer.forward(z, lambda, true);
   EXPECT_GT((exact - rounded).abs().max().item<float>(), 0);
   EXPECT_LT((exact - rounded).norm().item<float>(), 0.03f * exact.norm().item<float>());
 }

@@ -1,4 +1,5 @@
-// Every gradient of the picture against finite differences, in double; and the float instance against the double one.
+// Every gradient of the picture against finite differences, in double; and the float instance
+// against the double one.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -9,13 +10,18 @@
 namespace figurine {
 namespace {
 
-// Central differences with these steps are good to about 1e-6 of the largest gradient (rounding of the image over the step).
+// Central differences with these steps are good to about 1e-6 of the largest gradient (rounding of
+// the image over the step).
 constexpr double kTolerance = 1e-4;
 
 void expect_small(const testing::GradientErrors& errors, uint32_t degree) {
   for (const auto& [kind, error] : errors) {
-    std::printf("SH degree %u, %-18s largest relative error %.3g of %llu values (%llu with a smaller step)\n", degree, kind.c_str(),
-                error.largest_relative, static_cast<unsigned long long>(error.checked), static_cast<unsigned long long>(error.refined));
+    std::printf(
+        "SH degree %u, %-18s largest relative error %.3g of %llu values (%llu with a smaller "
+        "step)\n",
+        degree, kind.c_str(), error.largest_relative,
+        static_cast<unsigned long long>(error.checked),
+        static_cast<unsigned long long>(error.refined));
     EXPECT_LE(error.refined, error.checked / 100) << kind;
     EXPECT_GT(error.largest_gradient, 0) << kind;
     EXPECT_LT(error.largest_relative, kTolerance) << kind;
@@ -23,7 +29,8 @@ void expect_small(const testing::GradientErrors& errors, uint32_t degree) {
 }
 
 TEST(SplatGradients, EqualFiniteDifferencesForEveryShDegree) {
-  for (uint32_t degree = 0; degree <= kMaxShDegree; ++degree) expect_small(testing::check_splat_gradients(degree, 120), degree);
+  for (uint32_t degree = 0; degree <= kMaxShDegree; ++degree)
+    expect_small(testing::check_splat_gradients(degree, 120), degree);
 }
 
 TEST(HeadGradients, EqualFiniteDifferencesThroughSkinningAndSplatting) {
@@ -31,14 +38,21 @@ TEST(HeadGradients, EqualFiniteDifferencesThroughSkinningAndSplatting) {
 }
 
 TEST(SplatGradients, StoppedPixelsAndClampedAlphasEqualFiniteDifferences) {
-  // Nearly opaque, overlapping: alphas at 0.99 and pixels that stop early. A value that sits on a jump is not a gradient's to follow: at
-  // most a few may.
-  model::GaussianBuffer<double> gaussians = testing::to_buffer<double>(
-      testing::random_gaussians({.count = 150, .scale_m = 0.12, .extent_m = 0.5, .low_opacity = 0.97, .high_opacity = 1.0, .seed = 77}));
+  // Nearly opaque, overlapping: alphas at 0.99 and pixels that stop early. A value that sits on a
+  // jump is not a gradient's to follow: at most a few may.
+  model::GaussianBuffer<double> gaussians =
+      testing::to_buffer<double>(testing::random_gaussians({.count = 150,
+                                                            .scale_m = 0.12,
+                                                            .extent_m = 0.5,
+                                                            .low_opacity = 0.97,
+                                                            .high_opacity = 1.0,
+                                                            .seed = 77}));
   const Camera camera = testing::test_camera(48);
   const model::PixelRect crop{0, 0, 48, 48};
   model::Splatter<double> splatter({.threads = 1});
-  const std::function<std::vector<double>()> render = [&] { return testing::splat(splatter, gaussians, camera, crop); };
+  const std::function<std::vector<double>()> render = [&] {
+    return testing::splat(splatter, gaussians, camera, crop);
+  };
   const std::vector<double> weights = testing::random_weights(4 * 48 * 48);
   const std::vector<double> image = render();
   EXPECT_GT(*std::max_element(image.begin() + 3 * 48 * 48, image.end()), 0.999);
@@ -47,33 +61,40 @@ TEST(SplatGradients, StoppedPixelsAndClampedAlphasEqualFiniteDifferences) {
   splatter.backward(image.data(), weights.data(), gradients.gradients());
   std::vector<testing::Checked> checked;
   for (size_t i = 0; i < gaussians.position_m.size(); ++i) {
-    checked.push_back({gradients.position_m[i], testing::central_difference(gaussians.position_m[i], 1e-7, weights, render)});
+    checked.push_back(
+        {gradients.position_m[i],
+         testing::central_difference(gaussians.position_m[i], 1e-7, weights, render)});
   }
   double largest = 0;
   for (const testing::Checked& v : checked) largest = std::max(largest, std::abs(v.analytic));
   int jumps = 0;
   double worst = 0;
   for (const testing::Checked& v : checked) {
-    const double relative = std::abs(v.analytic - v.numeric) / std::max({std::abs(v.analytic), std::abs(v.numeric), 1e-3 * largest});
+    const double relative = std::abs(v.analytic - v.numeric) /
+                            std::max({std::abs(v.analytic), std::abs(v.numeric), 1e-3 * largest});
     if (relative > 1e-3)
       ++jumps;
     else
       worst = std::max(worst, relative);
   }
-  std::printf("%d of %zu values on a jump, largest relative error of the others %.3g\n", jumps, checked.size(), worst);
+  std::printf("%d of %zu values on a jump, largest relative error of the others %.3g\n", jumps,
+              checked.size(), worst);
   EXPECT_LE(jumps, 4);
 }
 
 TEST(SplatGradients, FloatEqualsDouble) {
-  const oracle::Gaussians scene = testing::random_gaussians({.count = 4000, .sh_degree = 1, .seed = 21});
+  const oracle::Gaussians scene =
+      testing::random_gaussians({.count = 4000, .sh_degree = 1, .seed = 21});
   const Camera camera = testing::test_camera(200);
   const model::PixelRect crop{0, 0, 200, 200};
   model::Splatter<double> exact({.threads = 2});
   model::Splatter<float> fast({.threads = 2});
   const auto wide = testing::to_buffer<double>(scene);
   const auto narrow = testing::to_buffer<float>(scene);
-  const std::vector<double> wide_image = testing::splat(exact, wide, camera, crop), weights = testing::random_weights(wide_image.size());
-  const std::vector<float> narrow_image = testing::splat(fast, narrow, camera, crop), narrow_weights(weights.begin(), weights.end());
+  const std::vector<double> wide_image = testing::splat(exact, wide, camera, crop),
+                            weights = testing::random_weights(wide_image.size());
+  const std::vector<float> narrow_image = testing::splat(fast, narrow, camera, crop),
+                           narrow_weights(weights.begin(), weights.end());
   model::GaussianBuffer<double> wide_gradients;
   model::GaussianBuffer<float> narrow_gradients;
   wide_gradients.resize(scene.count, scene.sh_degree);
@@ -82,14 +103,17 @@ TEST(SplatGradients, FloatEqualsDouble) {
   fast.backward(narrow_image.data(), narrow_weights.data(), narrow_gradients.gradients());
   const auto relative_rms = [](const std::vector<double>& a, const std::vector<float>& b) {
     double error = 0, size = 0;
-    for (size_t i = 0; i < a.size(); ++i) error += (a[i] - double(b[i])) * (a[i] - double(b[i])), size += a[i] * a[i];
+    for (size_t i = 0; i < a.size(); ++i)
+      error += (a[i] - double(b[i])) * (a[i] - double(b[i])), size += a[i] * a[i];
     return std::sqrt(error / size);
   };
-  const double errors[4] = {relative_rms(wide_gradients.position_m, narrow_gradients.position_m),
-                            relative_rms(wide_gradients.covariance_factor, narrow_gradients.covariance_factor),
-                            relative_rms(wide_gradients.opacity, narrow_gradients.opacity),
-                            relative_rms(wide_gradients.sh, narrow_gradients.sh)};
-  std::printf("relative RMS of position, factor, opacity, SH: %.3g %.3g %.3g %.3g\n", errors[0], errors[1], errors[2], errors[3]);
+  const double errors[4] = {
+      relative_rms(wide_gradients.position_m, narrow_gradients.position_m),
+      relative_rms(wide_gradients.covariance_factor, narrow_gradients.covariance_factor),
+      relative_rms(wide_gradients.opacity, narrow_gradients.opacity),
+      relative_rms(wide_gradients.sh, narrow_gradients.sh)};
+  std::printf("relative RMS of position, factor, opacity, SH: %.3g %.3g %.3g %.3g\n", errors[0],
+              errors[1], errors[2], errors[3]);
   // Most of it is single pixels that cross the alpha cut in one precision and not in the other.
   for (double error : errors) EXPECT_LT(error, 2e-2);
 }
@@ -97,11 +121,15 @@ TEST(SplatGradients, FloatEqualsDouble) {
 TEST(HeadGradients, HostileOutputsGiveFiniteGradients) {
   const testing::SyntheticBody capsule(16, 14);
   const std::vector<Affine> transforms = capsule.bent();
-  const model::HeadFrame frame{
-      .body = &capsule.body, .texel_position_m = capsule.position, .world_from_rest = transforms, .decoding = {.sh_degree = 1}};
+  const model::HeadFrame frame{.body = &capsule.body,
+                               .texel_position_m = capsule.position,
+                               .world_from_rest = transforms,
+                               .decoding = {.sh_degree = 1}};
   constexpr uint32_t kChannels = head_channels(1);
   std::vector<float> head(size_t(16) * 16 * kChannels, 0.1f);
-  const auto at = [&](uint32_t texel) { return &head[size_t(capsule.body.texel[texel]) * kChannels]; };
+  const auto at = [&](uint32_t texel) {
+    return &head[size_t(capsule.body.texel[texel]) * kChannels];
+  };
   at(100)[10] = 1e4f;
   at(101)[10] = -1e4f;
   at(102)[3] = 1e4f;  // scale beyond the clamp
@@ -126,14 +154,18 @@ TEST(HeadGradients, HostileOutputsGiveFiniteGradients) {
   std::vector<float> head_gradient(head.size());
   decode_head_backward(frame, head.data(), gradients, 1, head_gradient.data());
   for (size_t i = 0; i < head.size(); ++i)
-    ASSERT_TRUE(std::isfinite(head_gradient[i])) << "texel " << i / kChannels << " channel " << i % kChannels;
+    ASSERT_TRUE(std::isfinite(head_gradient[i]))
+        << "texel " << i / kChannels << " channel " << i % kChannels;
 }
 
 TEST(HeadDecoding, EqualsTheSharedArithmetic) {
   // Against figurine::blend, transform_point and rotation_from_quaternion, which the runtime uses.
   const testing::SyntheticBody capsule(16, 14);
   const std::vector<Affine> transforms = capsule.bent();
-  const model::HeadFrame frame{.body = &capsule.body, .texel_position_m = capsule.position, .world_from_rest = transforms, .decoding = {}};
+  const model::HeadFrame frame{.body = &capsule.body,
+                               .texel_position_m = capsule.position,
+                               .world_from_rest = transforms,
+                               .decoding = {}};
   std::mt19937 random(5);
   std::normal_distribution<float> normal;
   std::vector<float> head(size_t(16) * 16 * 14);
@@ -142,7 +174,8 @@ TEST(HeadDecoding, EqualsTheSharedArithmetic) {
   decode_head(frame, head.data(), 2, gaussians);
   for (uint32_t i = 0; i < capsule.body.texel_count(); ++i) {
     const float* h = &head[size_t(capsule.body.texel[i]) * 14];
-    const Affine m = blend(transforms, &capsule.texel_joints[i * kSkinInfluences], &capsule.weights[i * kSkinInfluences]);
+    const Affine m = blend(transforms, &capsule.texel_joints[i * kSkinInfluences],
+                           &capsule.weights[i * kSkinInfluences]);
     float canonical[3], quaternion[4];
     for (int k = 0; k < 3; ++k) canonical[k] = capsule.position[3 * i + k] + 0.05f * h[k];
     for (int k = 0; k < 4; ++k) quaternion[k] = (k == 0 ? 1.0f : 0.0f) + h[6 + k];
@@ -151,7 +184,8 @@ TEST(HeadDecoding, EqualsTheSharedArithmetic) {
     for (int r = 0; r < 3; ++r) {
       ASSERT_EQ(gaussians.position_m[3 * i + r], position[r]);
       for (int j = 0; j < 3; ++j) {
-        const float rotated = m.m[4 * r] * rotation[j] + m.m[4 * r + 1] * rotation[3 + j] + m.m[4 * r + 2] * rotation[6 + j];
+        const float rotated = m.m[4 * r] * rotation[j] + m.m[4 * r + 1] * rotation[3 + j] +
+                              m.m[4 * r + 2] * rotation[6 + j];
         const float scale = 0.6f * capsule.spacing[i] * std::exp(h[3 + j]);
         ASSERT_EQ(gaussians.covariance_factor[9 * i + 3 * r + j], rotated * scale);
       }

@@ -1,5 +1,5 @@
-// figurine_model_bench: milliseconds of every part of a training iteration at the `edge` setting (medians of interleaved rounds). Not a
-// test.
+// figurine_model_bench: milliseconds of every part of a training iteration at the `edge` setting
+// (medians of interleaved rounds). Not a test.
 #include <time.h>
 
 #include <algorithm>
@@ -27,9 +27,14 @@ namespace {
 using namespace figurine;
 using namespace figurine::model;
 
-double now_ms() { return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now_ms() {
+  return std::chrono::duration<double, std::milli>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
 
-// Of all threads of the process: on a busy machine with one thread the only figure that means something.
+// Of all threads of the process: on a busy machine with one thread the only figure that means
+// something.
 double cpu_ms() {
   timespec t;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
@@ -50,9 +55,16 @@ int main(int argc, char** argv) {
   keep_freed_memory();
   const testing::SyntheticBody capsule(128, 77);
   const std::vector<Affine> transforms = capsule.bent();
-  Camera camera = *make_orbit_camera(
-      {.azimuth_deg = 20, .elevation_deg = 5, .distance_m = 3, .vertical_fov_deg = 34, .target_m = {0, 0.87f, 0}}, 512, 512);
-  const HeadFrame frame{.body = &capsule.body, .texel_position_m = capsule.position, .world_from_rest = transforms, .decoding = {}};
+  Camera camera = *make_orbit_camera({.azimuth_deg = 20,
+                                      .elevation_deg = 5,
+                                      .distance_m = 3,
+                                      .vertical_fov_deg = 34,
+                                      .target_m = {0, 0.87f, 0}},
+                                     512, 512);
+  const HeadFrame frame{.body = &capsule.body,
+                        .texel_position_m = capsule.position,
+                        .world_from_rest = transforms,
+                        .decoding = {}};
   std::mt19937 random(1);
   std::normal_distribution<float> normal;
   std::vector<float> head(128 * 128 * 14), head_gradient(head.size());
@@ -65,11 +77,13 @@ int main(int argc, char** argv) {
   Splatter<float> splatter({.threads = threads});
   torch::set_num_threads(static_cast<int>(threads));
   const bool bf16 = argc <= 3 || std::string(argv[3]) == "bf16";
-  PoseUNet unet(make_pose_unet(128, 26, 32, head_channels(0)),
-                {.precision = bf16 ? model::Precision::kBfloat16 : model::Precision::kFloat32, .seed = 1});
+  PoseUNet unet(
+      make_pose_unet(128, 26, 32, head_channels(0)),
+      {.precision = bf16 ? model::Precision::kBfloat16 : model::Precision::kFloat32, .seed = 1});
   Optimiser adamw(adamw_group(unet.parameter_count()), {}), muon(unet.muon_groups(), {});
   AvatarRenderer renderer({.threads = threads});
-  const torch::Tensor input = torch::randn({128, 128, 26}), head_weights = torch::randn({128, 128, 14});
+  const torch::Tensor input = torch::randn({128, 128, 26}),
+                      head_weights = torch::randn({128, 128, 14});
   torch::Tensor unet_head;
   SsimScratch<float> scratch;
   std::vector<float> ssim_gradient(3 * 512 * 512), other(3 * 512 * 512, 0.4f);
@@ -84,12 +98,30 @@ int main(int argc, char** argv) {
   };
   std::vector<Row> rows{
       {"decode", [&] { decode_head(frame, head.data(), threads, gaussians); }, {}, {}},
-      {"splat forward", [&] { splatter.forward(gaussians.view(), camera, crop, image.data()); }, {}, {}},
-      {"splat backward", [&] { splatter.backward(image.data(), image_gradient.data(), gradients.gradients()); }, {}, {}},
-      {"decode backward", [&] { decode_head_backward(frame, head.data(), gradients, threads, head_gradient.data()); }, {}, {}},
-      {"SSIM, both ways", [&] { ssim<float>({image.data(), other.data(), 3, 512, 512}, threads, scratch, ssim_gradient.data()); }, {}, {}},
+      {"splat forward",
+       [&] { splatter.forward(gaussians.view(), camera, crop, image.data()); },
+       {},
+       {}},
+      {"splat backward",
+       [&] { splatter.backward(image.data(), image_gradient.data(), gradients.gradients()); },
+       {},
+       {}},
+      {"decode backward",
+       [&] { decode_head_backward(frame, head.data(), gradients, threads, head_gradient.data()); },
+       {},
+       {}},
+      {"SSIM, both ways",
+       [&] {
+         ssim<float>({image.data(), other.data(), 3, 512, 512}, threads, scratch,
+                     ssim_gradient.data());
+       },
+       {},
+       {}},
       {"whole loss",
-       [&] { image_loss(torch::from_blob(image.data(), {4, 512, 512}), target, {0.5f, 0.5f, 0.5f}, loss_options, &terms); },
+       [&] {
+         image_loss(torch::from_blob(image.data(), {4, 512, 512}), target, {0.5f, 0.5f, 0.5f},
+                    loss_options, &terms);
+       },
        {},
        {}},
       {"UNet forward", [&] { unet_head = unet.forward(input); }, {}, {}},
@@ -107,14 +139,16 @@ int main(int argc, char** argv) {
     }
   }
   const SplatterStatistics& statistics = splatter.statistics();
-  std::printf("%u threads, %u Gaussians, %llu visible, %llu pairs, %llu blocks\n", threads, gaussians.count,
-              static_cast<unsigned long long>(statistics.visible), static_cast<unsigned long long>(statistics.pairs),
+  std::printf("%u threads, %u Gaussians, %llu visible, %llu pairs, %llu blocks\n", threads,
+              gaussians.count, static_cast<unsigned long long>(statistics.visible),
+              static_cast<unsigned long long>(statistics.pairs),
               static_cast<unsigned long long>(statistics.blocks));
   for (Row& row : rows) {
     std::sort(row.ms.begin(), row.ms.end());
     std::sort(row.cpu.begin(), row.cpu.end());
-    std::printf("%-18s %8.3f ms (best %.3f), CPU %8.3f ms (best %.3f)\n", row.name.c_str(), row.ms[row.ms.size() / 2], row.ms.front(),
-                row.cpu[row.cpu.size() / 2], row.cpu.front());
+    std::printf("%-18s %8.3f ms (best %.3f), CPU %8.3f ms (best %.3f)\n", row.name.c_str(),
+                row.ms[row.ms.size() / 2], row.ms.front(), row.cpu[row.cpu.size() / 2],
+                row.cpu.front());
   }
   return 0;
 }

@@ -1,4 +1,5 @@
-// The trainer's model on LibTorch: UNet, renderer node, loss and optimiser against references that share no code with them.
+// The trainer's model on LibTorch: UNet, renderer node, loss and optimiser against references that
+// share no code with them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +19,8 @@
 namespace figurine::model {
 namespace {
 
-// The network's definition (figurine/network.h), evaluated value by value in double. input: [T,T,C].
+// The network's definition (figurine/network.h), evaluated value by value in double. input:
+// [T,T,C].
 std::vector<double> evaluate(const Network& network, const std::vector<double>& input) {
   const std::vector<ValueShape> shapes = *infer_shapes(network, true);
   std::vector<std::vector<double>> values{input};
@@ -31,7 +33,9 @@ std::vector<double> evaluate(const Network& network, const std::vector<double>& 
     for (int y = 0; y < static_cast<int>(shape.size); ++y) {
       for (int x = 0; x < static_cast<int>(shape.size); ++x) {
         for (uint32_t c = 0; c < shape.channels; ++c) {
-          const auto at = [&](int v, int u, uint32_t channel) { return a[(size_t(v) * in.size + u) * in.channels + channel]; };
+          const auto at = [&](int v, int u, uint32_t channel) {
+            return a[(size_t(v) * in.size + u) * in.channels + channel];
+          };
           double value = 0;
           if (layer.op == LayerOp::kConv2d) {
             const int k = static_cast<int>(layer.kernel);
@@ -41,14 +45,17 @@ std::vector<double> evaluate(const Network& network, const std::vector<double>& 
                 const int v = y + dy - k / 2, u = x + dx - k / 2;
                 if (v < 0 || u < 0 || v >= size || u >= size) continue;
                 for (uint32_t ic = 0; ic < in.channels; ++ic)
-                  value += at(v, u, ic) * layer.weights[((size_t(c) * k + dy) * k + dx) * in.channels + ic];
+                  value += at(v, u, ic) *
+                           layer.weights[((size_t(c) * k + dy) * k + dx) * in.channels + ic];
               }
             }
             if (layer.relu) value = std::max(value, 0.0);
           } else if (layer.op == LayerOp::kMaxPool2) {
-            value = std::max({at(2 * y, 2 * x, c), at(2 * y, 2 * x + 1, c), at(2 * y + 1, 2 * x, c), at(2 * y + 1, 2 * x + 1, c)});
+            value = std::max({at(2 * y, 2 * x, c), at(2 * y, 2 * x + 1, c), at(2 * y + 1, 2 * x, c),
+                              at(2 * y + 1, 2 * x + 1, c)});
           } else if (layer.op == LayerOp::kUpsample2) {
-            // Half-pixel centres: a quarter and three quarters of the two nearest, clamped at the edge.
+            // Half-pixel centres: a quarter and three quarters of the two nearest, clamped at the
+            // edge.
             const auto tap = [&](int out_at, int& low, int& high, double& weight) {
               const double source = (out_at + 0.5) / 2 - 0.5;
               low = static_cast<int>(std::floor(source));
@@ -60,11 +67,14 @@ std::vector<double> evaluate(const Network& network, const std::vector<double>& 
             double wv, wu;
             tap(y, v0, v1, wv);
             tap(x, u0, u1, wu);
-            value = (1 - wv) * ((1 - wu) * at(v0, u0, c) + wu * at(v0, u1, c)) + wv * ((1 - wu) * at(v1, u0, c) + wu * at(v1, u1, c));
+            value = (1 - wv) * ((1 - wu) * at(v0, u0, c) + wu * at(v0, u1, c)) +
+                    wv * ((1 - wu) * at(v1, u0, c) + wu * at(v1, u1, c));
           } else if (c < in.channels) {
             value = at(y, x, c);
           } else {
-            value = values[layer.inputs[1]][(size_t(y) * shape.size + x) * shapes[layer.inputs[1]].channels + (c - in.channels)];
+            value = values[layer.inputs[1]]
+                          [(size_t(y) * shape.size + x) * shapes[layer.inputs[1]].channels +
+                           (c - in.channels)];
           }
           out[(size_t(y) * shape.size + x) * shape.channels + c] = value;
         }
@@ -90,40 +100,49 @@ std::vector<double> to_double(const torch::Tensor& tensor) {
 
 TEST(PoseUNet, HasThePapersParameterCountsAndTokenLengths) {
   const auto count = [](uint32_t size, uint32_t input, uint32_t channels, uint32_t degree) {
-    return PoseUNet(make_pose_unet(size, input, channels, head_channels(degree)), {}).parameter_count();
+    return PoseUNet(make_pose_unet(size, input, channels, head_channels(degree)), {})
+        .parameter_count();
   };
   EXPECT_EQ(count(256, 6, 64, 3), 598'011u);   // paper
   EXPECT_EQ(count(128, 6, 32, 0), 150'094u);   // edge
   EXPECT_EQ(count(32, 6, 8, 0), 9'886u);       // nano
   EXPECT_EQ(count(128, 26, 32, 0), 155'854u);  // with five Fourier octaves
   EXPECT_EQ(count(32, 26, 8, 0), 11'326u);
-  const std::vector<uint64_t> paper = PoseUNet(make_pose_unet(256, 6, 64, head_channels(3)), {}).token_lengths();
+  const std::vector<uint64_t> paper =
+      PoseUNet(make_pose_unet(256, 6, 64, head_channels(3)), {}).token_lengths();
   const uint64_t same = 64 * 64 * 9 + 64, doubled = 128 * 64 * 9 + 64;
-  EXPECT_EQ(paper, (std::vector<uint64_t>{6 * 64 * 9 + 64, same, same, same, same, same, same, same, doubled, same, doubled, same, doubled,
-                                          same, 64 * 59 + 59}));
+  EXPECT_EQ(paper,
+            (std::vector<uint64_t>{6 * 64 * 9 + 64, same, same, same, same, same, same, same,
+                                   doubled, same, doubled, same, doubled, same, 64 * 59 + 59}));
   EXPECT_EQ(*std::max_element(paper.begin(), paper.end()), 73'792u);
 }
 
 TEST(PoseUNet, ForwardEqualsTheDefinitionOfTheNetwork) {
   for (uint32_t size : {16u, 32u}) {
-    PoseUNet unet(make_pose_unet(size, 6, 8, head_channels(0)), {.precision = Precision::kFloat32, .seed = 3, .head_weight_factor = 1});
+    PoseUNet unet(make_pose_unet(size, 6, 8, head_channels(0)),
+                  {.precision = Precision::kFloat32, .seed = 3, .head_weight_factor = 1});
     const torch::Tensor input = random_tensor({size, size, 6}, 4);
     const torch::Tensor head = unet.forward(input);
     ASSERT_EQ(head.sizes(), torch::IntArrayRef({size, size, 14}));
     std::vector<float> storage;
-    const std::vector<double> truth = evaluate(unet.export_network(storage), to_double(input)), seen = to_double(head);
+    const std::vector<double> truth = evaluate(unet.export_network(storage), to_double(input)),
+                              seen = to_double(head);
     double largest = 0;
-    for (size_t i = 0; i < truth.size(); ++i) largest = std::max(largest, std::abs(truth[i] - seen[i]));
+    for (size_t i = 0; i < truth.size(); ++i)
+      largest = std::max(largest, std::abs(truth[i] - seen[i]));
     std::printf("T = %u: largest error %.3g\n", size, largest);
     EXPECT_LT(largest, 2e-5);
   }
 }
 
 TEST(PoseUNet, GradientsEqualFiniteDifferencesOfTheDefinition) {
-  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)), {.precision = Precision::kFloat32, .seed = 5, .head_weight_factor = 1});
-  const torch::Tensor input = random_tensor({16, 16, 6}, 6), weights = random_tensor({16, 16, 14}, 7);
+  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)),
+                {.precision = Precision::kFloat32, .seed = 5, .head_weight_factor = 1});
+  const torch::Tensor input = random_tensor({16, 16, 6}, 6),
+                      weights = random_tensor({16, 16, 14}, 7);
   unet.forward(input).backward(weights);
-  const std::vector<double> gradient = to_double(unet.gradients()), by_output = to_double(weights), wide_input = to_double(input);
+  const std::vector<double> gradient = to_double(unet.gradients()), by_output = to_double(weights),
+                            wide_input = to_double(input);
   std::vector<float> storage;
   const Network network = unet.export_network(storage);
   const auto loss = [&] {
@@ -146,7 +165,8 @@ TEST(PoseUNet, GradientsEqualFiniteDifferencesOfTheDefinition) {
       storage[i] = kept;
       return (up - down) / (above - below);
     };
-    // A ReLU's or pool's kink inside the step shows as two steps that disagree; such a value says nothing.
+    // A ReLU's or pool's kink inside the step shows as two steps that disagree; such a value says
+    // nothing.
     const double coarse = difference(1e-4f), fine = difference(1e-5f);
     if (std::abs(coarse - fine) > 1e-3 * (std::abs(fine) + scale)) {
       ++kinks;
@@ -154,25 +174,29 @@ TEST(PoseUNet, GradientsEqualFiniteDifferencesOfTheDefinition) {
     }
     largest = std::max(largest, std::abs(gradient[i] - fine) / (std::abs(fine) + scale));
   }
-  std::printf("%d of %d values on a kink, largest relative error of the others %.3g\n", kinks, checked, largest);
+  std::printf("%d of %d values on a kink, largest relative error of the others %.3g\n", kinks,
+              checked, largest);
   EXPECT_LT(largest, 2e-3);
   EXPECT_LT(kinks, checked / 5);
 }
 
 TEST(PoseUNet, Bfloat16StaysCloseToFloat) {
   const Network network = make_pose_unet(64, 26, 16, head_channels(0));
-  PoseUNet exact(network, {.precision = Precision::kFloat32, .seed = 8}), fast(network, {.precision = Precision::kBfloat16, .seed = 8});
-  const torch::Tensor input = random_tensor({64, 64, 26}, 9), weights = random_tensor({64, 64, 14}, 10);
+  PoseUNet exact(network, {.precision = Precision::kFloat32, .seed = 8}),
+      fast(network, {.precision = Precision::kBfloat16, .seed = 8});
+  const torch::Tensor input = random_tensor({64, 64, 26}, 9),
+                      weights = random_tensor({64, 64, 14}, 10);
   const torch::Tensor exact_head = exact.forward(input), fast_head = fast.forward(input);
   exact_head.backward(weights);
   fast_head.backward(weights);
   torch::NoGradGuard guard;
   const double head = ((exact_head - fast_head).norm() / exact_head.norm()).item<double>();
-  const double cosine =
-      (torch::dot(exact.gradients(), fast.gradients()) / (exact.gradients().norm() * fast.gradients().norm())).item<double>();
+  const double cosine = (torch::dot(exact.gradients(), fast.gradients()) /
+                         (exact.gradients().norm() * fast.gradients().norm()))
+                            .item<double>();
   std::printf("relative RMS of the head %.3g, cosine of the gradients %.5f\n", head, cosine);
-  // Eight bits of mantissa: 0.2 to 0.4 % a value. Gradients of a random picture are sums that nearly cancel, so their direction is what can
-  // be asked for.
+  // Eight bits of mantissa: 0.2 to 0.4 % a value. Gradients of a random picture are sums that
+  // nearly cancel, so their direction is what can be asked for.
   EXPECT_LT(head, 0.02);
   EXPECT_GT(cosine, 0.99);
 }
@@ -182,10 +206,13 @@ TEST(PoseUNet, TheSameSeedGivesTheSameWeightsOnEveryMachine) {
   PoseUNet a(network, {.seed = 1}), b(network, {.seed = 1}), c(network, {.seed = 2});
   EXPECT_TRUE(torch::equal(a.weights(), b.weights()));
   EXPECT_FALSE(torch::equal(a.weights(), c.weights()));
-  // The first two draws of SplitMix64(1), 0x910a2dec89025cc1 and 0xbeeb8da1658eec67, as 24-bit integers around zero, times sqrt(6 / 234).
+  // The first two draws of SplitMix64(1), 0x910a2dec89025cc1 and 0xbeeb8da1658eec67, as 24-bit
+  // integers around zero, times sqrt(6 / 234).
   const float bound = std::sqrt(6.0f / 234.0f);
-  EXPECT_EQ(a.weights()[0].item<float>(), bound * (static_cast<float>(0x910a2d - 0x800000) * 0x1p-23f));
-  EXPECT_EQ(a.weights()[1].item<float>(), bound * (static_cast<float>(0xbeeb8d - 0x800000) * 0x1p-23f));
+  EXPECT_EQ(a.weights()[0].item<float>(),
+            bound * (static_cast<float>(0x910a2d - 0x800000) * 0x1p-23f));
+  EXPECT_EQ(a.weights()[1].item<float>(),
+            bound * (static_cast<float>(0xbeeb8d - 0x800000) * 0x1p-23f));
 }
 
 TEST(PoseUNet, InitialBiasesAreZeroButTheColours) {
@@ -211,8 +238,10 @@ TEST(PoseUNet, ExportedWeightsComeBack) {
 }
 
 TEST(PoseUNet, BackwardPassesAddUp) {
-  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)), {.precision = Precision::kFloat32, .seed = 1});
-  const torch::Tensor input = random_tensor({16, 16, 6}, 1), weights = random_tensor({16, 16, 14}, 2);
+  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)),
+                {.precision = Precision::kFloat32, .seed = 1});
+  const torch::Tensor input = random_tensor({16, 16, 6}, 1),
+                      weights = random_tensor({16, 16, 14}, 2);
   unet.forward(input).backward(weights);
   const torch::Tensor once = unet.gradients().clone();
   unet.forward(input).backward(weights);
@@ -235,7 +264,9 @@ TEST(Optimiser, AdamWEqualsItsEquations) {
       const double g = gradients[i].item<float>();
       m[i] = 0.9 * m[i] + 0.1 * g;
       v[i] = 0.999 * v[i] + 0.001 * g * g;
-      w[i] -= 1e-2 * (m[i] / (1 - std::pow(0.9, step)) / (std::sqrt(v[i] / (1 - std::pow(0.999, step))) + options.epsilon) + 0.05 * w[i]);
+      w[i] -= 1e-2 * (m[i] / (1 - std::pow(0.9, step)) /
+                          (std::sqrt(v[i] / (1 - std::pow(0.999, step))) + options.epsilon) +
+                      0.05 * w[i]);
       largest = std::max(largest, std::abs(w[i] - weights[i].item<float>()));
     }
   }
@@ -255,19 +286,23 @@ torch::Tensor newton_schulz(const torch::Tensor& matrix) {
 
 TEST(Muon, OrthogonalisesAsWrittenOnTheWholeMatrix) {
   double largest = 0;
-  for (const auto& [rows, columns] : {std::pair<int64_t, int64_t>{32, 288}, {8, 8}, {64, 54}, {1, 9}}) {
+  for (const auto& [rows, columns] :
+       {std::pair<int64_t, int64_t>{32, 288}, {8, 8}, {64, 54}, {1, 9}}) {
     const torch::Tensor matrix = random_tensor({rows, columns}, 7) * 1e-6f;
-    const double error = (orthogonalised(matrix) - newton_schulz(matrix)).abs().max().item<double>();
+    const double error =
+        (orthogonalised(matrix) - newton_schulz(matrix)).abs().max().item<double>();
     largest = std::max(largest, error);
   }
   std::printf("largest error %.3g\n", largest);
   EXPECT_LT(largest, 1e-5);  // the last product is in float, of up to 64 terms below 2
 }
 
-// A step of equal length along every direction: singular values from a five hundredth of the norm up come out near 1, however unequal.
+// A step of equal length along every direction: singular values from a five hundredth of the norm
+// up come out near 1, however unequal.
 TEST(Muon, MakesSingularValuesEqual) {
   const torch::Tensor u = std::get<0>(at::linalg_qr(random_tensor({32, 32}, 1).to(torch::kDouble))),
-                      v = std::get<0>(at::linalg_qr(random_tensor({288, 32}, 2).to(torch::kDouble)));
+                      v = std::get<0>(
+                          at::linalg_qr(random_tensor({288, 32}, 2).to(torch::kDouble)));
   torch::Tensor singular = torch::logspace(0, -2.5, 32, 10.0, torch::kDouble);
   const torch::Tensor matrix = at::mm(u * singular, v.t()).to(torch::kFloat);
   const torch::Tensor found = at::linalg_svdvals(orthogonalised(matrix).to(torch::kDouble));
@@ -291,7 +326,8 @@ TEST(Muon, StaysFiniteAtTheEnds) {
 }
 
 TEST(Optimiser, MuonMovesAKernelByItsEquationsAndLeavesTheRestToAdamW) {
-  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)), {.precision = Precision::kFloat32, .seed = 1});
+  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)),
+                {.precision = Precision::kFloat32, .seed = 1});
   const std::vector<ParameterGroup> groups = unet.muon_groups();
   ASSERT_EQ(groups.size(), 30u);  // kernel and bias of 15 convolutions
   EXPECT_EQ(groups.back().end, static_cast<int64_t>(unet.parameter_count()));
@@ -301,7 +337,9 @@ TEST(Optimiser, MuonMovesAKernelByItsEquationsAndLeavesTheRestToAdamW) {
   torch::Tensor weights = unet.weights().detach().clone(), other = weights.clone();
   const ParameterGroup& kernel = groups[2];
   const auto matrix = [&](const torch::Tensor& flat) {
-    return flat.narrow(0, kernel.begin, kernel.end - kernel.begin).view({kernel.matrix_rows, -1}).to(torch::kDouble);
+    return flat.narrow(0, kernel.begin, kernel.end - kernel.begin)
+        .view({kernel.matrix_rows, -1})
+        .to(torch::kDouble);
   };
   torch::Tensor expected = matrix(weights), mean = torch::zeros_like(expected);
   for (int step = 1; step <= 3; ++step) {
@@ -310,12 +348,13 @@ TEST(Optimiser, MuonMovesAKernelByItsEquationsAndLeavesTheRestToAdamW) {
     ASSERT_TRUE(adamw.step(other, gradients, 1e-2));
     mean = 0.95 * mean + 0.05 * matrix(gradients);
     const torch::Tensor direction = newton_schulz(0.95 * mean + 0.05 * matrix(gradients));
-    expected = expected * (1 - 1e-2 * 0.1) - direction * (1e-2 * 0.2 * std::sqrt(static_cast<double>(expected.size(1))));
+    expected = expected * (1 - 1e-2 * 0.1) -
+               direction * (1e-2 * 0.2 * std::sqrt(static_cast<double>(expected.size(1))));
   }
   EXPECT_LT((matrix(weights) - expected).abs().max().item<double>(), 1e-6);
   for (const ParameterGroup& group : {groups[3], groups[28], groups[29]}) {
-    EXPECT_TRUE(
-        torch::equal(weights.narrow(0, group.begin, group.end - group.begin), other.narrow(0, group.begin, group.end - group.begin)));
+    EXPECT_TRUE(torch::equal(weights.narrow(0, group.begin, group.end - group.begin),
+                             other.narrow(0, group.begin, group.end - group.begin)));
   }
 }
 
@@ -332,7 +371,8 @@ TEST(Optimiser, LeavesWeightsAloneWhenAGradientIsNotFinite) {
 }
 
 // SSIM by its definition: an 11x11 window at every pixel, in double.
-double brute_force_ssim(const std::vector<double>& x, const std::vector<double>& y, int channels, int height, int width) {
+double brute_force_ssim(const std::vector<double>& x, const std::vector<double>& y, int channels,
+                        int height, int width) {
   double window[11], norm = 0, sum = 0;
   for (int k = 0; k < 11; ++k) norm += window[k] = std::exp(-(k - 5) * (k - 5) / (2 * 1.5 * 1.5));
   for (int c = 0; c < channels; ++c) {
@@ -345,10 +385,12 @@ double brute_force_ssim(const std::vector<double>& x, const std::vector<double>&
             const double weight = window[dv + 5] * window[du + 5] / (norm * norm);
             const size_t at = (size_t(c) * height + v + dv) * width + u + du;
             mx += weight * x[at], my += weight * y[at];
-            xx += weight * x[at] * x[at], yy += weight * y[at] * y[at], xy += weight * x[at] * y[at];
+            xx += weight * x[at] * x[at], yy += weight * y[at] * y[at],
+                xy += weight * x[at] * y[at];
           }
         }
-        sum += (2 * mx * my + 1e-4) * (2 * (xy - mx * my) + 9e-4) / ((mx * mx + my * my + 1e-4) * (xx - mx * mx + yy - my * my + 9e-4));
+        sum += (2 * mx * my + 1e-4) * (2 * (xy - mx * my) + 9e-4) /
+               ((mx * mx + my * my + 1e-4) * (xx - mx * mx + yy - my * my + 9e-4));
       }
     }
   }
@@ -375,7 +417,9 @@ TEST(Ssim, EqualsItsDefinition) {
   for (const auto& [height, width] : {std::pair{7, 9}, std::pair{40, 75}, std::pair{120, 66}}) {
     const TwoImages images = two_images(height, width);
     SsimScratch<double> scratch;
-    const double seen = ssim<double>({images.x.data(), images.y.data(), 2, uint32_t(height), uint32_t(width)}, 2, scratch, nullptr);
+    const double seen =
+        ssim<double>({images.x.data(), images.y.data(), 2, uint32_t(height), uint32_t(width)}, 2,
+                     scratch, nullptr);
     const double truth = brute_force_ssim(images.x, images.y, 2, height, width);
     std::printf("%dx%d: %.12f, error %.3g\n", height, width, truth, std::abs(seen - truth));
     EXPECT_NEAR(seen, truth, 1e-12);
@@ -386,7 +430,9 @@ TEST(Ssim, GradientEqualsFiniteDifferences) {
   TwoImages images = two_images(102, 70);  // more than one tile both ways
   SsimScratch<double> scratch;
   std::vector<double> gradient(images.x.size());
-  const auto value = [&](double* out) { return ssim<double>({images.x.data(), images.y.data(), 2, 102, 70}, 2, scratch, out); };
+  const auto value = [&](double* out) {
+    return ssim<double>({images.x.data(), images.y.data(), 2, 102, 70}, 2, scratch, out);
+  };
   value(gradient.data());
   double largest = 0, scale = 0;
   for (double g : gradient) scale = std::max(scale, std::abs(g));
@@ -397,7 +443,8 @@ TEST(Ssim, GradientEqualsFiniteDifferences) {
     images.x[i] = kept - h;
     const double down = value(nullptr);
     images.x[i] = kept;
-    largest = std::max(largest, std::abs((up - down) / (2 * h) - gradient[i]) / std::max(std::abs(gradient[i]), 0.01 * scale));
+    largest = std::max(largest, std::abs((up - down) / (2 * h) - gradient[i]) /
+                                    std::max(std::abs(gradient[i]), 0.01 * scale));
   }
   std::printf("largest relative error %.3g\n", largest);
   EXPECT_LT(largest, 1e-5);
@@ -408,17 +455,20 @@ TEST(Ssim, FloatEqualsDoubleForAnyNumberOfThreads) {
   const std::vector<float> x(images.x.begin(), images.x.end()), y(images.y.begin(), images.y.end());
   SsimScratch<double> wide_scratch;
   std::vector<double> truth(x.size());
-  const double wide = ssim<double>({images.x.data(), images.y.data(), 2, 150, 133}, 1, wide_scratch, truth.data());
+  const double wide =
+      ssim<double>({images.x.data(), images.y.data(), 2, 150, 133}, 1, wide_scratch, truth.data());
   std::vector<float> first;
   for (uint32_t threads : {1u, 2u, 5u}) {
     SsimScratch<float> scratch;
     std::vector<float> gradient(x.size());
-    EXPECT_NEAR((ssim<float>({x.data(), y.data(), 2, 150, 133}, threads, scratch, gradient.data())), wide, 1e-5);
+    EXPECT_NEAR((ssim<float>({x.data(), y.data(), 2, 150, 133}, threads, scratch, gradient.data())),
+                wide, 1e-5);
     if (first.empty()) first = gradient;
     EXPECT_EQ(gradient, first);
   }
   double error = 0, size = 0;
-  for (size_t i = 0; i < truth.size(); ++i) error += std::pow(truth[i] - double(first[i]), 2), size += truth[i] * truth[i];
+  for (size_t i = 0; i < truth.size(); ++i)
+    error += std::pow(truth[i] - double(first[i]), 2), size += truth[i] * truth[i];
   std::printf("relative RMS of the float gradient %.3g\n", std::sqrt(error / size));
   EXPECT_LT(std::sqrt(error / size), 1e-4);
 }
@@ -432,22 +482,32 @@ TEST(ImageLoss, ValueAndGradientEqualTorchsOwnOperations) {
   image_loss(image, target, background, {.threads = 2}, &terms).backward();
 
   torch::Tensor x = image.detach().to(torch::kDouble).requires_grad_();
-  const torch::Tensor y = target.to(torch::kDouble), behind = torch::tensor({0.5, double(0.2f), double(0.9f)}).view({3, 1, 1});
-  const auto composed = [&](const torch::Tensor& t) { return t.slice(0, 0, 3) + (1 - t.slice(0, 3, 4)) * behind; };
+  const torch::Tensor y = target.to(torch::kDouble),
+                      behind = torch::tensor({0.5, double(0.2f), double(0.9f)}).view({3, 1, 1});
+  const auto composed = [&](const torch::Tensor& t) {
+    return t.slice(0, 0, 3) + (1 - t.slice(0, 3, 4)) * behind;
+  };
   const torch::Tensor a = composed(x), b = composed(y);
-  torch::Tensor window = torch::exp(-(torch::arange(11, torch::kDouble) - 5).pow(2) / (2 * 1.5 * 1.5));
+  torch::Tensor window =
+      torch::exp(-(torch::arange(11, torch::kDouble) - 5).pow(2) / (2 * 1.5 * 1.5));
   window = window / window.sum();
   const torch::Tensor kernel = torch::outer(window, window).expand({3, 1, 11, 11}).contiguous();
   const auto mean = [&](const torch::Tensor& t) {
-    return torch::nn::functional::conv2d(t.unsqueeze(0), kernel, torch::nn::functional::Conv2dFuncOptions().padding(5).groups(3));
+    return torch::nn::functional::conv2d(
+        t.unsqueeze(0), kernel, torch::nn::functional::Conv2dFuncOptions().padding(5).groups(3));
   };
-  const torch::Tensor ma = mean(a), mb = mean(b), va = mean(a * a) - ma * ma, vb = mean(b * b) - mb * mb, cov = mean(a * b) - ma * mb;
-  const torch::Tensor ssim_mean = ((2 * ma * mb + 1e-4) * (2 * cov + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4))).mean();
-  const torch::Tensor l1 = (a - b).abs().mean(), mask = (x[3] - y[3]).abs().mean(), loss = l1 + 0.1 * (1 - ssim_mean) + 0.1 * mask;
+  const torch::Tensor ma = mean(a), mb = mean(b), va = mean(a * a) - ma * ma,
+                      vb = mean(b * b) - mb * mb, cov = mean(a * b) - ma * mb;
+  const torch::Tensor ssim_mean =
+      ((2 * ma * mb + 1e-4) * (2 * cov + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4)))
+          .mean();
+  const torch::Tensor l1 = (a - b).abs().mean(), mask = (x[3] - y[3]).abs().mean(),
+                      loss = l1 + 0.1 * (1 - ssim_mean) + 0.1 * mask;
   loss.backward();
-  const double difference = (image.grad() - x.grad()).abs().max().item<double>() / x.grad().abs().max().item<double>();
-  std::printf("loss %.7f against %.7f, gradient's largest error %.3g of its largest value\n", double(terms.total), loss.item<double>(),
-              difference);
+  const double difference =
+      (image.grad() - x.grad()).abs().max().item<double>() / x.grad().abs().max().item<double>();
+  std::printf("loss %.7f against %.7f, gradient's largest error %.3g of its largest value\n",
+              double(terms.total), loss.item<double>(), difference);
   EXPECT_NEAR(terms.l1, l1.item<double>(), 1e-6);
   EXPECT_NEAR(terms.ssim, ssim_mean.item<double>(), 1e-5);
   EXPECT_NEAR(terms.mask, mask.item<double>(), 1e-6);
@@ -461,9 +521,15 @@ TEST(ImageLoss, ValueAndGradientEqualTorchsOwnOperations) {
 struct TinyScene {
   testing::SyntheticBody capsule{32, 26};
   std::vector<Affine> transforms = capsule.bent();
-  HeadFrame frame{.body = &capsule.body, .texel_position_m = capsule.position, .world_from_rest = transforms, .decoding = {}};
-  RenderView view{*make_orbit_camera({.azimuth_deg = 20, .distance_m = 3, .vertical_fov_deg = 36, .target_m = {0, 0.87f, 0}}, 96, 96),
-                  {20, 4, 60, 88}};
+  HeadFrame frame{.body = &capsule.body,
+                  .texel_position_m = capsule.position,
+                  .world_from_rest = transforms,
+                  .decoding = {}};
+  RenderView view{
+      *make_orbit_camera(
+          {.azimuth_deg = 20, .distance_m = 3, .vertical_fov_deg = 36, .target_m = {0, 0.87f, 0}},
+          96, 96),
+      {20, 4, 60, 88}};
 };
 
 TEST(AvatarRenderer, GradientIsThatOfItsParts) {
@@ -478,10 +544,13 @@ TEST(AvatarRenderer, GradientIsThatOfItsParts) {
   decode_head(scene.frame, head.const_data_ptr<float>(), 1, gaussians);
   Splatter<float> splatter({.threads = 1});
   torch::Tensor again = torch::empty_like(image), expected = torch::empty_like(head);
-  splatter.forward(gaussians.view(), scene.view.camera, scene.view.crop, again.mutable_data_ptr<float>());
+  splatter.forward(gaussians.view(), scene.view.camera, scene.view.crop,
+                   again.mutable_data_ptr<float>());
   gradients.resize(gaussians.count, 0);
-  splatter.backward(again.const_data_ptr<float>(), weights.const_data_ptr<float>(), gradients.gradients());
-  decode_head_backward(scene.frame, head.const_data_ptr<float>(), gradients, 1, expected.mutable_data_ptr<float>());
+  splatter.backward(again.const_data_ptr<float>(), weights.const_data_ptr<float>(),
+                    gradients.gradients());
+  decode_head_backward(scene.frame, head.const_data_ptr<float>(), gradients, 1,
+                       expected.mutable_data_ptr<float>());
   EXPECT_TRUE(torch::equal(image, again));
   EXPECT_TRUE(torch::equal(head.grad(), expected));
 }
@@ -496,8 +565,9 @@ TEST(AvatarRenderer, RefusesABackwardPassWhoseBuffersAreGone) {
 }
 
 TEST(Model, LearnsAPictureOfItself) {
-  // A UNet is to draw what another UNet's weights draw: the loss falls to a fraction in a few dozen steps, in both precisions. On one
-  // thread: such small layers would spend a busy machine's time at barriers.
+  // A UNet is to draw what another UNet's weights draw: the loss falls to a fraction in a few dozen
+  // steps, in both precisions. On one thread: such small layers would spend a busy machine's time
+  // at barriers.
   torch::set_num_threads(1);
   for (const Precision precision : {Precision::kFloat32, Precision::kBfloat16}) {
     TinyScene scene;
@@ -516,7 +586,8 @@ TEST(Model, LearnsAPictureOfItself) {
     float first = 0;
     for (int step = 0; step < 80; ++step) {
       student.zero_gradients();
-      image_loss(renderer.render(student.forward(input), scene.frame, scene.view), target, {0.5f, 0.5f, 0.5f}, {.threads = 1}, &terms)
+      image_loss(renderer.render(student.forward(input), scene.frame, scene.view), target,
+                 {0.5f, 0.5f, 0.5f}, {.threads = 1}, &terms)
           .backward();
       ASSERT_TRUE(adamw.step(student.weights(), student.gradients(), 4e-3));
       if (step == 0) first = terms.total;

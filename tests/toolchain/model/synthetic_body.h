@@ -1,5 +1,5 @@
-// A body of texels without a mesh, for the model's tests and its bench: a capsule 1.75 m tall that faces +z, with a bent three-joint
-// skeleton.
+// A body of texels without a mesh, for the model's tests and its bench: a capsule 1.75 m tall that
+// faces +z, with a bent three-joint skeleton.
 #pragma once
 
 #include <cmath>
@@ -26,10 +26,13 @@ struct SyntheticBody {
         const double angle = 2 * kPi * (u + 0.5) / uv_size, along = (v + 0.5) / rows;
         const double radius = kRadius * std::sqrt(std::max(0.02, 1 - std::pow(2 * along - 1, 6)));
         texel.push_back((v + (uv_size - rows) / 2) * uv_size + u);
-        const double p[3] = {radius * std::sin(angle), kHeight * (1 - along), radius * std::cos(angle)};
+        const double p[3] = {radius * std::sin(angle), kHeight * (1 - along),
+                             radius * std::cos(angle)};
         for (double value : p) position.push_back(static_cast<float>(value));
-        for (double value : {std::sin(angle), 0.0, std::cos(angle)}) normal.push_back(static_cast<float>(value));
-        spacing.push_back(static_cast<float>(std::sqrt(kHeight / rows * 2 * kPi * kRadius / uv_size)));
+        for (double value : {std::sin(angle), 0.0, std::cos(angle)})
+          normal.push_back(static_cast<float>(value));
+        spacing.push_back(
+            static_cast<float>(std::sqrt(kHeight / rows * 2 * kPi * kRadius / uv_size)));
         double w[3];
         double sum = 0;
         for (int j = 0; j < 3; ++j) sum += w[j] = std::exp(-8 * std::pow(p[1] - 0.3 - 0.6 * j, 2));
@@ -59,9 +62,12 @@ struct SyntheticBody {
 
   // A bent pose's skinning transforms.
   std::vector<Affine> bent() const {
-    const std::vector<float> rotations{0.98f, 0.05f, 0.17f, 0.02f, 0.96f, 0.2f, 0.1f, -0.05f, 0.95f, -0.15f, 0.1f, 0.2f};
+    const std::vector<float> rotations{0.98f, 0.05f,  0.17f, 0.02f,  0.96f, 0.2f,
+                                       0.1f,  -0.05f, 0.95f, -0.15f, 0.1f,  0.2f};
     std::vector<Affine> transforms(3);
-    skinning_transforms(body.mean_skeleton(), {.root_translation_m = {0.02f, 0.01f, -0.03f}, .rotations = rotations}, transforms);
+    skinning_transforms(body.mean_skeleton(),
+                        {.root_translation_m = {0.02f, 0.01f, -0.03f}, .rotations = rotations},
+                        transforms);
     return transforms;
   }
 };

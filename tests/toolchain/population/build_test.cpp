@@ -1,5 +1,6 @@
-// A whole small population, from the recipe to the package: what is left behind, that a build killed anywhere goes on to the same bits, and
-// that a member that fails takes no other with it. Builds fork, so nothing here starts a thread.
+// A whole small population, from the recipe to the package: what is left behind, that a build
+// killed anywhere goes on to the same bits, and that a member that fails takes no other with it.
+// Builds fork, so nothing here starts a thread.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -34,7 +35,11 @@ struct Workplace {
     train::write_json(folder.path("recipe.json"), testing_tools::small_recipe());
   }
   BuildOptions options(const std::string& state) const {
-    return {.recipe = folder.path("recipe.json"), .state = folder.path(state), .makehuman = {}, .slots = 2, .quiet = true};
+    return {.recipe = folder.path("recipe.json"),
+            .state = folder.path(state),
+            .makehuman = {},
+            .slots = 2,
+            .quiet = true};
   }
 };
 
@@ -44,17 +49,22 @@ std::string bytes_of(const std::string& path) {
 }
 
 void expect_same_weights(const std::string& a, const std::string& b) {
-  const train::PackageFile first = train::open_package(a, PackageKind::kAvatar), second = train::open_package(b, PackageKind::kAvatar);
+  const train::PackageFile first = train::open_package(a, PackageKind::kAvatar),
+                           second = train::open_package(b, PackageKind::kAvatar);
   const Network &one = first.package.avatar().network, &other = second.package.avatar().network;
   ASSERT_EQ(one.layers.size(), other.layers.size());
   for (size_t i = 0; i < one.layers.size(); ++i) {
-    EXPECT_TRUE(std::ranges::equal(one.layers[i].weights, other.layers[i].weights)) << a << " layer " << i;
-    EXPECT_TRUE(std::ranges::equal(one.layers[i].bias, other.layers[i].bias)) << a << " layer " << i;
+    EXPECT_TRUE(std::ranges::equal(one.layers[i].weights, other.layers[i].weights))
+        << a << " layer " << i;
+    EXPECT_TRUE(std::ranges::equal(one.layers[i].bias, other.layers[i].bias))
+        << a << " layer " << i;
   }
 }
 
 size_t entries(const std::string& folder) {
-  return fs::exists(folder) ? static_cast<size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator())) : 0;
+  return fs::exists(folder) ? static_cast<size_t>(std::distance(fs::directory_iterator(folder),
+                                                                fs::directory_iterator()))
+                            : 0;
 }
 
 TEST(BuildPopulation, LeavesMembersTableSplitAndPackage) {
@@ -96,7 +106,8 @@ TEST(BuildPopulation, LeavesMembersTableSplitAndPackage) {
     build(place.options("state"));
     FAIL() << "went on with another recipe";
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("training: differs from"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("training: differs from"), std::string::npos)
+        << error.what();
   }
 }
 
@@ -145,18 +156,23 @@ TEST(BuildPopulation, AMemberThatFailsTakesNoOtherWithIt) {
     build(place.options("state"));
     ADD_FAILURE() << "said nothing";
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("1 of 4 members failed"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("1 of 4 members failed"), std::string::npos)
+        << error.what();
   }
   const std::string said = testing::internal::GetCapturedStderr();
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
   EXPECT_NE(said.find("000001: "), std::string::npos) << said;
   EXPECT_NE(said.find("figurine.json"), std::string::npos) << said;
-  EXPECT_EQ(train::open_package(state.package(), PackageKind::kPopulation).package.population().size(), 3u);
+  EXPECT_EQ(
+      train::open_package(state.package(), PackageKind::kPopulation).package.population().size(),
+      3u);
   EXPECT_NE(bytes_of(state.table()).find("000001,train,failed"), std::string::npos);
   // Mended, the build goes on with that one alone.
   fs::remove_all(state.captures() + "/000001");
   build(place.options("state"));
-  EXPECT_EQ(train::open_package(state.package(), PackageKind::kPopulation).package.population().size(), 4u);
+  EXPECT_EQ(
+      train::open_package(state.package(), PackageKind::kPopulation).package.population().size(),
+      4u);
 }
 
 }  // namespace

@@ -14,7 +14,8 @@ train::TensorFile weights(std::vector<float> values, std::vector<int64_t> shape 
 }
 
 TEST(ReptileStep, MovesAPartOfTheWayToTheMean) {
-  const train::TensorFile next = reptile_step(weights({1, 10}), {weights({2, 20}), weights({4, 40})}, 0.25);
+  const train::TensorFile next =
+      reptile_step(weights({1, 10}), {weights({2, 20}), weights({4, 40})}, 0.25);
   EXPECT_EQ(next.tensors.at("layer.0.weight").values, (std::vector<float>{1.5f, 15}));
 }
 
@@ -25,12 +26,14 @@ TEST(ReptileStep, WholeIsTheMeanAndNeedsNoWeights) {
 
 TEST(ReptileStep, StaysWhereAllFineTunedWeightsAre) {
   const train::TensorFile at = weights({0.1f, -7.3f});
-  EXPECT_EQ(reptile_step(at, {at, at, at}, 0.37).tensors.at("layer.0.weight").values, at.tensors.at("layer.0.weight").values);
+  EXPECT_EQ(reptile_step(at, {at, at, at}, 0.37).tensors.at("layer.0.weight").values,
+            at.tensors.at("layer.0.weight").values);
 }
 
 TEST(ReptileStep, RefusesWeightsOfAnotherShape) {
   EXPECT_THROW(reptile_step(weights({1, 2}), {weights({1, 2}, {1, 2})}, 0.5), InputError);
-  EXPECT_THROW(reptile_step(weights({1, 2}), {weights({1, 2}), weights({1, 2, 3}, {3})}, 0.5), InputError);
+  EXPECT_THROW(reptile_step(weights({1, 2}), {weights({1, 2}), weights({1, 2, 3}, {3})}, 0.5),
+               InputError);
   EXPECT_THROW(reptile_step({}, {weights({1, 2})}, 0.5), InputError);
 }
 

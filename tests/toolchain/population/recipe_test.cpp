@@ -41,15 +41,24 @@ TEST(Recipe, SaysWhoIsMadeAndHow) {
 
 TEST(Recipe, TheSplitNamesWhatOnlyTheTestPartWears) {
   nlohmann::json json = small_recipe();
-  json["groups"] = {{{"split", "train"}, {"first", 0}, {"count", 2}, {"exclude_outfits", {"a", "b"}}, {"exclude_skins", {"s"}}},
-                    {{"split", "validation"}, {"first", 5}, {"count", 1}, {"exclude_outfits", {"b", "c"}}, {"exclude_skins", {"s"}}},
+  json["groups"] = {{{"split", "train"},
+                     {"first", 0},
+                     {"count", 2},
+                     {"exclude_outfits", {"a", "b"}},
+                     {"exclude_skins", {"s"}}},
+                    {{"split", "validation"},
+                     {"first", 5},
+                     {"count", 1},
+                     {"exclude_outfits", {"b", "c"}},
+                     {"exclude_skins", {"s"}}},
                     {{"split", "test"}, {"first", 7}, {"count", 1}}};
   json["evaluation"] = nlohmann::json::object();
   const nlohmann::json split = split_of(read(json));
   EXPECT_EQ(split.at("train"), nlohmann::json({"000000", "000001"}));
   EXPECT_EQ(split.at("validation"), nlohmann::json({"000005"}));
   EXPECT_EQ(split.at("test"), nlohmann::json({"000007"}));
-  EXPECT_EQ(split.at("only_test").at("outfits"), nlohmann::json({"b"}));  // the validation part may wear a
+  EXPECT_EQ(split.at("only_test").at("outfits"),
+            nlohmann::json({"b"}));  // the validation part may wear a
   EXPECT_EQ(split.at("only_test").at("skins"), nlohmann::json({"s"}));
 }
 
@@ -64,10 +73,13 @@ TEST(Recipe, RefusesWhatItCannotMeanInOneLine) {
       {[](auto& j) { j["capture"]["size_px"] = 8; }, "capture.size_px: must lie in 16 to 8192"},
       {[](auto& j) { j["groups"][1]["first"] = 2; }, "groups: identity 2 is in two of them"},
       {[](auto& j) { j["groups"][0]["split"] = "dev"; }, "groups[0].split: 'dev' is none of"},
-      {[](auto& j) { j["groups"][0]["split"] = "validation"; }, "groups: none is of the part train"},
+      {[](auto& j) { j["groups"][0]["split"] = "validation"; },
+       "groups: none is of the part train"},
       {[](auto& j) { j["groups"][0]["count"] = 5000; }, "groups[0].count: must lie in 1 to"},
-      {[](auto& j) { j["initial_weights"]["identities"] = 4; }, "initial_weights.identities: 4 of 3 training identities"},
-      {[](auto& j) { j["initial_weights"]["first_step"] = 1.5; }, "initial_weights.first_step: out of range"},
+      {[](auto& j) { j["initial_weights"]["identities"] = 4; },
+       "initial_weights.identities: 4 of 3 training identities"},
+      {[](auto& j) { j["initial_weights"]["first_step"] = 1.5; },
+       "initial_weights.first_step: out of range"},
       {[](auto& j) { j["training"]["iteration"] = 4; }, "training: iteration: unknown field"},
       {[](auto& j) { j["training"]["precision"] = "f16"; }, "training.precision: 'f16' is neither"},
       {[](auto& j) { j["package"] = {{"levels", 128}}; }, "levels: must lie in 1 to 127"},

@@ -34,10 +34,13 @@ inline void write_swinging_motion(const std::string& path) {
     clip.root_translation_m.insert(clip.root_translation_m.end(), {0, 0, 0});
     for (uint32_t j = 0; j < body::kJointCount; ++j) {
       const double angle = 0.25 * std::sin(0.2 * f + 1.7 * j);
-      clip.rotations.insert(clip.rotations.end(), {static_cast<float>(std::cos(angle / 2)), static_cast<float>(std::sin(angle / 2)), 0, 0});
+      clip.rotations.insert(clip.rotations.end(), {static_cast<float>(std::cos(angle / 2)),
+                                                   static_cast<float>(std::sin(angle / 2)), 0, 0});
     }
   }
-  throw_if_error(ports::write_file_atomically(path, value_or_throw(write_package(clip.view(), {.tool = "test"}), path)), path);
+  throw_if_error(ports::write_file_atomically(
+                     path, value_or_throw(write_package(clip.view(), {.tool = "test"}), path)),
+                 path);
 }
 
 }  // namespace figurine::testing_tools

@@ -1,4 +1,5 @@
-// Calibration and fine-tuning of a small run: what they may look at, what they leave alone, and that they help.
+// Calibration and fine-tuning of a small run: what they may look at, what they leave alone, and
+// that they help.
 #include "toolchain/quantize/fine_tune.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +41,9 @@ const std::string& trained_run() {
   return run;
 }
 
-FineTuneOptions short_fine_tune() { return {.calibration = {.poses = 8}, .iterations = 40, .quiet = true}; }
+FineTuneOptions short_fine_tune() {
+  return {.calibration = {.poses = 8}, .iterations = 40, .quiet = true};
+}
 
 TEST(Calibration, SharesScalesInGroupsAndGivesReluOutputsZeroPointMinus128) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = trained_run()});
@@ -48,7 +51,8 @@ TEST(Calibration, SharesScalesInGroupsAndGivesReluOutputsZeroPointMinus128) {
   const Network network = avatar.model().unet().export_network(storage);
   const ActivationStatistics statistics = observe_activations(avatar, 8);
   EXPECT_EQ(statistics.poses, 8u);
-  for (RangeMethod method : {RangeMethod::kMinMax, RangeMethod::kPercentile, RangeMethod::kSmallestError}) {
+  for (RangeMethod method :
+       {RangeMethod::kMinMax, RangeMethod::kPercentile, RangeMethod::kSmallestError}) {
     const Scales scales = choose_scales(network, statistics, {.method = method});
     EXPECT_EQ(scales.values[0].zero_point, 0);
     for (size_t value = 1; value < scales.values.size(); ++value) {
@@ -62,7 +66,8 @@ TEST(Calibration, SharesScalesInGroupsAndGivesReluOutputsZeroPointMinus128) {
 TEST(Calibration, LooksAtNoHeldOutPose) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = trained_run()});
   uint32_t training = 0;
-  for (const dataset::CaptureFrame& frame : avatar.data().frames()) training += frame.split == dataset::FrameSplit::kTrain;
+  for (const dataset::CaptureFrame& frame : avatar.data().frames())
+    training += frame.split == dataset::FrameSplit::kTrain;
   ASSERT_LT(training, avatar.data().frames().size());
   EXPECT_EQ(observe_activations(avatar, 1000).poses, training);
 }
@@ -92,27 +97,37 @@ TEST(FineTune, LeavesTheRunAloneAndIsNotRepeated) {
   EXPECT_EQ(second.scales.values, first.scales.values);
   FineTuneOptions other = short_fine_tune();
   other.iterations = 41;
-  EXPECT_NE(std::filesystem::last_write_time(fine_tune(avatar, {trained_run()}, other).weights), written);
+  EXPECT_NE(std::filesystem::last_write_time(fine_tune(avatar, {trained_run()}, other).weights),
+            written);
 }
 
 TEST(EvaluateQuantization, ReportsEveryRowAndTheIntegersAgree) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = trained_run()});
   const torch::Tensor before = avatar.model().unet().weights().detach().clone();
-  const nlohmann::json report = evaluate::evaluate_quantization(
-      avatar, {trained_run()},
-      {.calibration = {.poses = 8}, .fine_tune = short_fine_tune(), .motion = "", .views_per_pose = 2, .training_poses = 2, .quiet = true});
-  EXPECT_TRUE(torch::equal(before, avatar.model().unet().weights().detach())) << "the evaluation gives the network back as it was";
+  const nlohmann::json report = evaluate::evaluate_quantization(avatar, {trained_run()},
+                                                                {.calibration = {.poses = 8},
+                                                                 .fine_tune = short_fine_tune(),
+                                                                 .motion = "",
+                                                                 .views_per_pose = 2,
+                                                                 .training_poses = 2,
+                                                                 .quiet = true});
+  EXPECT_TRUE(torch::equal(before, avatar.model().unet().weights().detach()))
+      << "the evaluation gives the network back as it was";
   const nlohmann::json summary = evaluate::summarise_quantization({report, report});
-  for (const char* name : {"ptq", "ptq_minmax", "ptq_percentile", "ptq_mse", "qat", "dynamic", "ptq_int8_input", "ptq_float_head"}) {
-    const auto row =
-        std::find_if(summary.at("rows").begin(), summary.at("rows").end(), [&](const auto& r) { return r.at("name") == name; });
+  for (const char* name : {"ptq", "ptq_minmax", "ptq_percentile", "ptq_mse", "qat", "dynamic",
+                           "ptq_int8_input", "ptq_float_head"}) {
+    const auto row = std::find_if(summary.at("rows").begin(), summary.at("rows").end(),
+                                  [&](const auto& r) { return r.at("name") == name; });
     ASSERT_NE(row, summary.at("rows").end()) << name;
-    std::printf("%s: drop %.3f dB, to f32 %.2f dB\n", name, row->at("psnr_drop_db").get<double>(), row->at("psnr_to_f32_db").get<double>());
+    std::printf("%s: drop %.3f dB, to f32 %.2f dB\n", name, row->at("psnr_drop_db").get<double>(),
+                row->at("psnr_to_f32_db").get<double>());
     EXPECT_GT(row->at("psnr_to_f32_db").get<double>(), 25) << name;
   }
   EXPECT_EQ(report.at("layers").size(), 1u + 15u + 3u);
   for (const nlohmann::json& layer : report.at("layers")) {
-    EXPECT_GT(layer.at("psnr_to_f32_db").get<double>(), report.at("rows").at(0).at("psnr_to_f32_db").get<double>() - 1) << layer.dump();
+    EXPECT_GT(layer.at("psnr_to_f32_db").get<double>(),
+              report.at("rows").at(0).at("psnr_to_f32_db").get<double>() - 1)
+        << layer.dump();
   }
   EXPECT_LE(report.at("integer_reference").at("largest_difference_steps").get<double>(), 1);
   EXPECT_EQ(summary.at("worst_member").at("identity"), report.at("identity"));

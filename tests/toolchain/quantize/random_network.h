@@ -1,4 +1,5 @@
-// A pose UNet with random weights, its scales from its own values, and an input: what the tests of quantisation start from.
+// A pose UNet with random weights, its scales from its own values, and an input: what the tests of
+// quantisation start from.
 #pragma once
 
 #include <random>
@@ -19,7 +20,8 @@ inline torch::Tensor random_input(int64_t size, int64_t channels, uint32_t seed)
 }
 
 // keep: the share of every group's range that is kept; below 1 some values are clipped.
-inline quantize::Scales scales_of(const model::PoseUNet& unet, const torch::Tensor& input, float keep) {
+inline quantize::Scales scales_of(const model::PoseUNet& unet, const torch::Tensor& input,
+                                  float keep) {
   std::vector<float> storage;
   const Network network = unet.export_network(storage);
   const std::vector<uint32_t> group = quantize::scale_groups(network);
@@ -31,13 +33,15 @@ inline quantize::Scales scales_of(const model::PoseUNet& unet, const torch::Tens
     if (group[root] != root) continue;
     quantize::Range range;
     for (size_t value = root; value < network.layers.size(); ++value) {
-      if (group[value] == root) range.high = std::max(range.high, keep * values[value].max().item<float>());
+      if (group[value] == root)
+        range.high = std::max(range.high, keep * values[value].max().item<float>());
     }
     for (size_t value = root; value < network.layers.size(); ++value) {
       if (group[value] == root) scales.values[value] = quantize::quantisation_of(range);
     }
   }
-  scales.weight_scale = quantize::choose_weight_scales(network, scales.values, quantize::WeightRange::kMaxAbs);
+  scales.weight_scale =
+      quantize::choose_weight_scales(network, scales.values, quantize::WeightRange::kMaxAbs);
   return scales;
 }
 

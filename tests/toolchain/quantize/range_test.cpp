@@ -12,7 +12,8 @@ namespace {
 
 std::vector<float> ramp(size_t count, float high) {
   std::vector<float> values;
-  for (size_t i = 0; i < count; ++i) values.push_back(high * (static_cast<float>(i) + 0.5f) / static_cast<float>(count));
+  for (size_t i = 0; i < count; ++i)
+    values.push_back(high * (static_cast<float>(i) + 0.5f) / static_cast<float>(count));
   return values;
 }
 
@@ -24,14 +25,16 @@ TEST(Histogram, FindsTheSameRangesInWhateverOrderLargerValuesCome) {
   EXPECT_EQ(rising.count(), 20000u);
   EXPECT_EQ(rising.min_max().high, falling.min_max().high);
   EXPECT_EQ(rising.percentile(99).high, falling.percentile(99).high);
-  EXPECT_NEAR(rising.squared_error({0, 45}), falling.squared_error({0, 45}), 1e-3);  // of 169: a value on a bin's edge may go either way
+  EXPECT_NEAR(rising.squared_error({0, 45}), falling.squared_error({0, 45}),
+              1e-3);  // of 169: a value on a bin's edge may go either way
 }
 
 TEST(Histogram, PercentileLeavesItsShareOutside) {
   Histogram histogram;
   histogram.add(ramp(100000, 1.0f));
   for (double percent : {90.0, 99.0, 99.9}) {
-    EXPECT_NEAR(histogram.percentile(percent).high, percent / 100, 3e-4) << percent;  // a bin is 1/4096
+    EXPECT_NEAR(histogram.percentile(percent).high, percent / 100, 3e-4)
+        << percent;  // a bin is 1/4096
     EXPECT_EQ(histogram.percentile(percent).low, 0) << "no value is negative";
   }
 }
@@ -53,15 +56,16 @@ TEST(Histogram, SquaredErrorOfAUniformValueIsATwelfthOfTheStepSquared) {
   EXPECT_NEAR(histogram.squared_error({0, 1}), step * step / 12, 0.02 * step * step / 12);
 }
 
-// N values rounded to steps of h / 255 and one clipped from 8 to h: N (h / 255)^2 / 12 + (8 - h)^2 is smallest at h = 8 / (1 + N /
-// 780,300).
+// N values rounded to steps of h / 255 and one clipped from 8 to h: N (h / 255)^2 / 12 + (8 - h)^2
+// is smallest at h = 8 / (1 + N / 780,300).
 TEST(Histogram, SmallestErrorKeepsAUniformRangeAndCutsALoneOutlier) {
   Histogram uniform, outlier;
   uniform.add(ramp(1000000, 1.0f));
   outlier.add(ramp(1000000, 1.0f));
   outlier.add(std::vector<float>{8.0f});
   EXPECT_GE(uniform.smallest_error().high, 0.98f);
-  EXPECT_NEAR(outlier.smallest_error().high, 8 / (1 + 1000000 / 780300.0), 0.16);  // candidates are 0.08 apart
+  EXPECT_NEAR(outlier.smallest_error().high, 8 / (1 + 1000000 / 780300.0),
+              0.16);  // candidates are 0.08 apart
 }
 
 TEST(Histogram, OfNothingIsTheEmptyRange) {
@@ -100,7 +104,8 @@ TEST(WeightScale, SmallestErrorIsNeverWorseThanMaxAbs) {
   const auto error = [&](float scale) {
     double sum = 0;
     for (float weight : weights) {
-      const double difference = weight - scale * static_cast<float>(clamp_and_round(weight / scale, -127, 127));
+      const double difference =
+          weight - scale * static_cast<float>(clamp_and_round(weight / scale, -127, 127));
       sum += difference * difference;
     }
     return sum;

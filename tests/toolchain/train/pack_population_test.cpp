@@ -1,4 +1,5 @@
-// Avatar packages on disk into a population: which files are taken, where the split comes from, and whose fault it is if it does not work.
+// Avatar packages on disk into a population: which files are taken, where the split comes from, and
+// whose fault it is if it does not work.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -30,7 +31,8 @@ struct People {
     std::filesystem::create_directories(folder.path("runs/000000"));
     for (uint64_t m = 0; m < 3; ++m) {
       const std::string name = "00000" + std::to_string(m);
-      write(m < 2 ? "runs/" + name + "/avatar.fgn" : name + ".fgn", make_test_avatar(body, {.seed = m, .name = name}).bytes.bytes());
+      write(m < 2 ? "runs/" + name + "/avatar.fgn" : name + ".fgn",
+            make_test_avatar(body, {.seed = m, .name = name}).bytes.bytes());
     }
     write("runs/body.fgn", body.bytes.bytes());
   }
@@ -38,11 +40,17 @@ struct People {
   void write(const std::string& name, std::span<const std::byte> bytes) const {
     throw_if_error(ports::write_file_atomically(folder.path(name), bytes), name);
   }
-  void write(const std::string& name, const std::string& text) const { write(name, std::as_bytes(std::span(text))); }
-  PackPopulationOptions options() const { return {.inputs = {folder.path("runs"), folder.path("000002.fgn")}, .quiet = true}; }
+  void write(const std::string& name, const std::string& text) const {
+    write(name, std::as_bytes(std::span(text)));
+  }
+  PackPopulationOptions options() const {
+    return {.inputs = {folder.path("runs"), folder.path("000002.fgn")}, .quiet = true};
+  }
 };
 
-Package open(const AlignedBytes& bytes) { return value_or_throw(Package::open(bytes.bytes(), "population"), "test"); }
+Package open(const AlignedBytes& bytes) {
+  return value_or_throw(Package::open(bytes.bytes(), "population"), "test");
+}
 
 void expect_refused(const PackPopulationOptions& options, const std::string& words) {
   try {
@@ -77,7 +85,8 @@ TEST(PackPopulation, DiffersFromTheCommonInitialWeightsOrFromAFile) {
   std::vector<float> storage;
   const Network common = unet.export_network(storage);
   for (size_t i = 0; i < common.layers.size(); ++i) {
-    EXPECT_TRUE(std::ranges::equal(common.layers[i].weights, package.population().network.layers[i].weights));
+    EXPECT_TRUE(std::ranges::equal(common.layers[i].weights,
+                                   package.population().network.layers[i].weights));
   }
   TensorFile file;
   size_t convolution = 0;
@@ -86,7 +95,8 @@ TEST(PackPopulation, DiffersFromTheCommonInitialWeightsOrFromAFile) {
     const std::string name = "layer." + std::to_string(convolution++);
     const int64_t out = layer.out_channels, kernel = layer.kernel;
     const int64_t in = static_cast<int64_t>(layer.weights.size()) / (out * kernel * kernel);
-    file.tensors[name + ".weight"] = {{out, kernel, kernel, in}, std::vector<float>(layer.weights.size(), 0.25f)};
+    file.tensors[name + ".weight"] = {{out, kernel, kernel, in},
+                                      std::vector<float>(layer.weights.size(), 0.25f)};
     file.tensors[name + ".bias"] = {{out}, std::vector<float>(layer.bias.size(), 0.5f)};
   }
   write_tensor_file(people.folder.path("init.safetensors"), file);
@@ -100,7 +110,9 @@ TEST(PackPopulation, DiffersFromTheCommonInitialWeightsOrFromAFile) {
 
 TEST(PackPopulation, TakesTheSplitFromItsFile) {
   const People people;
-  people.write("split.json", R"({"train": ["000001"], "validation": [0], "test": ["000002", "000009"], "seed": 3})");
+  people.write(
+      "split.json",
+      R"({"train": ["000001"], "validation": [0], "test": ["000002", "000009"], "seed": 3})");
   PackPopulationOptions options = people.options();
   options.split = people.folder.path("split.json");
   const AlignedBytes bytes(pack_population(options));
@@ -133,12 +145,15 @@ TEST(PackPopulation, NamesTheInputThatDoesNotFit) {
   expect_refused(with("empty"), "has no avatar package below it");
   people.write("empty/broken.fgn", std::string("not a package"));
   expect_refused(with("empty"), "broken.fgn");
-  people.write("wider.fgn", make_test_avatar(people.body, {.channels = 6, .name = "wider"}).bytes.bytes());
+  people.write("wider.fgn",
+               make_test_avatar(people.body, {.channels = 6, .name = "wider"}).bytes.bytes());
   expect_refused(with("wider.fgn"), "member 'wider': its network has another shape");
   const tests::SyntheticBody other = make_test_body({.seed = 2});
   people.write("stranger.fgn", make_test_avatar(other, {.name = "stranger"}).bytes.bytes());
   expect_refused(with("stranger.fgn"), "member 'stranger': was made for the body");
-  people.write("fixed.fgn", make_test_avatar(people.body, {.held = tests::Held::kFixedPoint, .name = "fixed"}).bytes.bytes());
+  people.write("fixed.fgn",
+               make_test_avatar(people.body, {.held = tests::Held::kFixedPoint, .name = "fixed"})
+                   .bytes.bytes());
   expect_refused(with("fixed.fgn"), "member 'fixed': holds no float weights");
 }
 

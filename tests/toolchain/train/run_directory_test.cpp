@@ -18,7 +18,9 @@ namespace fs = std::filesystem;
 class RunDirectoryTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("figurine_run_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    folder_ = fs::temp_directory_path() /
+              ("figurine_run_" +
+               std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
@@ -61,7 +63,8 @@ TEST_F(RunDirectoryTest, TensorFileRefusesEveryPrefix) {
   std::ifstream file(path("x.safetensors"), std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(file)), {});
   for (size_t length = 0; length < bytes.size(); ++length) {
-    std::ofstream(path("cut"), std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(length));
+    std::ofstream(path("cut"), std::ios::binary)
+        .write(bytes.data(), static_cast<std::streamsize>(length));
     ASSERT_NE(read_error(path("cut")), "") << "prefix of " << length << " bytes was accepted";
   }
 }
@@ -73,21 +76,24 @@ TEST_F(RunDirectoryTest, TensorFileNamesWhatIsWrong) {
     const uint64_t length = header.size();
     file.write(reinterpret_cast<const char*>(&length), 8);
     file << header;
-    for (size_t i = 0; i < data_bytes / 4; ++i) file.write(reinterpret_cast<const char*>(&value), 4);
+    for (size_t i = 0; i < data_bytes / 4; ++i)
+      file.write(reinterpret_cast<const char*>(&value), 4);
   };
   write(R"({"w": {"dtype": "F16", "shape": [2], "data_offsets": [0, 4]}})", 4);
   EXPECT_NE(read_error(path("bad")).find("tensor w: dtype"), std::string::npos);
   write(R"({"w": {"dtype": "F32", "shape": [2], "data_offsets": [0, 4]}})", 4);
   EXPECT_NE(read_error(path("bad")).find("tensor w: shape"), std::string::npos);
   write(R"({"w": {"dtype": "F32", "shape": [4611686018427387904, 4], "data_offsets": [0, 4]}})", 4);
-  EXPECT_NE(read_error(path("bad")).find("tensor w: shape"), std::string::npos) << "the product overflows 64 bits";
+  EXPECT_NE(read_error(path("bad")).find("tensor w: shape"), std::string::npos)
+      << "the product overflows 64 bits";
   write(R"({"w": {"dtype": "F32", "shape": [1], "data_offsets": [0, 4]}})", 4, std::nanf(""));
   EXPECT_NE(read_error(path("bad")).find("not finite"), std::string::npos);
 }
 
 TEST_F(RunDirectoryTest, CheckpointRestoresWeightsMomentsAndCounters) {
   const TrainSettings settings = preset_settings("nano");
-  model::PoseUNet unet(make_network(settings), {.seed = 3}), other(make_network(settings), {.seed = 4});
+  model::PoseUNet unet(make_network(settings), {.seed = 3}),
+      other(make_network(settings), {.seed = 4});
   model::Optimiser optimiser(unet.muon_groups(), {}), restored(unet.muon_groups(), {});
   optimiser.first_moment.uniform_(-1, 1);
   optimiser.second_moment.uniform_(0, 1);

@@ -1,4 +1,5 @@
-// The order of images, the learning rate, the pose statistics: everything a resumed run has to repeat.
+// The order of images, the learning rate, the pose statistics: everything a resumed run has to
+// repeat.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -52,7 +53,10 @@ TEST(RandomUnit, IsUniformWithinSamplingError) {
 }
 
 TEST(Schedule, RampsThenFollowsTheCosineToItsFloor) {
-  const Schedule schedule{.peak = 1e-3, .ramp_iterations = 50, .floor_fraction = 0.02, .budget = {.iterations = 1000, .seconds = 0}};
+  const Schedule schedule{.peak = 1e-3,
+                          .ramp_iterations = 50,
+                          .floor_fraction = 0.02,
+                          .budget = {.iterations = 1000, .seconds = 0}};
   EXPECT_NEAR(learning_rate(schedule, 0, 0), 1e-3 / 50, 1e-12);
   EXPECT_NEAR(learning_rate(schedule, 500, 0), 1e-3 * (0.02 + 0.98 * 0.5), 1e-9);
   EXPECT_NEAR(learning_rate(schedule, 1000, 0), 2e-5, 1e-12);
@@ -60,7 +64,10 @@ TEST(Schedule, RampsThenFollowsTheCosineToItsFloor) {
 }
 
 TEST(Schedule, OfATimeBudgetFollowsTrainingSeconds) {
-  const Schedule schedule{.peak = 1, .ramp_iterations = 1, .floor_fraction = 0, .budget = {.iterations = 0, .seconds = 60}};
+  const Schedule schedule{.peak = 1,
+                          .ramp_iterations = 1,
+                          .floor_fraction = 0,
+                          .budget = {.iterations = 0, .seconds = 60}};
   EXPECT_NEAR(learning_rate(schedule, 12345, 30), 0.5, 1e-12);
   EXPECT_NEAR(progress(schedule.budget, 12345, 60), 1, 0);
 }
@@ -82,7 +89,8 @@ TEST(RotationVector, IsAxisTimesAngleForAnyLengthAndSign) {
 TEST(PoseFeatures, HaveTheirMeanAndARegularisedCovariance) {
   // Three joints; joint 2 turns about x by +-0.2, joint 1 never moves.
   std::vector<std::vector<float>> poses;
-  for (float angle : {-0.2f, 0.2f}) poses.push_back({1, 0, 0, 0, 1, 0, 0, 0, std::cos(angle / 2), std::sin(angle / 2), 0, 0});
+  for (float angle : {-0.2f, 0.2f})
+    poses.push_back({1, 0, 0, 0, 1, 0, 0, 0, std::cos(angle / 2), std::sin(angle / 2), 0, 0});
   const PoseFeatures features = pose_features(poses, 3);
   EXPECT_EQ(features.joints, (std::vector<uint8_t>{1, 2}));
   for (float value : features.mean) EXPECT_NEAR(value, 0, 1e-7);

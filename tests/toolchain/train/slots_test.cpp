@@ -1,5 +1,6 @@
-// Jobs in processes of their own: how each ends is told, and a training that is killed at any moment goes on to the same bits. Trainings
-// run in forked children here, so this process starts no thread before the last comparison.
+// Jobs in processes of their own: how each ends is told, and a training that is killed at any
+// moment goes on to the same bits. Trainings run in forked children here, so this process starts no
+// thread before the last comparison.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -24,10 +25,12 @@ using testing_tools::small_capture;
 using testing_tools::TemporaryFolder;
 
 std::map<size_t, JobResult> results_of(
-    size_t count, unsigned slots, const std::function<std::string(size_t)>& job, const std::function<void()>& waiting = [] {}) {
+    size_t count, unsigned slots, const std::function<std::string(size_t)>& job,
+    const std::function<void()>& waiting = [] {}) {
   std::map<size_t, JobResult> results;
   run_in_slots(
-      count, {.slots = slots, .poll_period_s = 0.01}, job, [&](size_t i, const JobResult& result) { results[i] = result; }, waiting);
+      count, {.slots = slots, .poll_period_s = 0.01}, job,
+      [&](size_t i, const JobResult& result) { results[i] = result; }, waiting);
   return results;
 }
 
@@ -53,15 +56,19 @@ TEST(Slots, TellHowEveryJobEnded) {
 
 TEST(Slots, RunAsManyJobsAtATimeAsThereAreSlots) {
   const TemporaryFolder folder;
-  const auto alive = [&] { return std::distance(fs::directory_iterator(folder.path("")), fs::directory_iterator()); };
+  const auto alive = [&] {
+    return std::distance(fs::directory_iterator(folder.path("")), fs::directory_iterator());
+  };
   std::ptrdiff_t most = 0;
   const std::map<size_t, JobResult> results = results_of(
       6, 3,
       [&](size_t i) {
         const std::string mark = folder.path(std::to_string(i));
         std::ofstream{mark};
-        // Until three are there, which two at a time would never be. The last three find none of the first.
-        for (int k = 0; k < 2000 && alive() < 3; ++k) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        // Until three are there, which two at a time would never be. The last three find none of
+        // the first.
+        for (int k = 0; k < 2000 && alive() < 3; ++k)
+          std::this_thread::sleep_for(std::chrono::milliseconds(1));
         const std::ptrdiff_t seen = alive();
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
         fs::remove(mark);
@@ -77,19 +84,22 @@ TEST(Slots, PassAnInterruptOnAndStartNothingMore) {
   std::map<size_t, JobResult> results;
   const auto job = [](size_t) -> std::string {
     const InterruptGuard interrupt;
-    for (int k = 0; k < 20000 && !interrupt.requested(); ++k) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    for (int k = 0; k < 20000 && !interrupt.requested(); ++k)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     if (interrupt.requested()) throw Interrupted("saved");
     return "never asked";
   };
   int waits = 0;
   EXPECT_THROW(run_in_slots(
-                   9, {.slots = 2, .poll_period_s = 0.01}, job, [&](size_t i, const JobResult& result) { results[i] = result; },
+                   9, {.slots = 2, .poll_period_s = 0.01}, job,
+                   [&](size_t i, const JobResult& result) { results[i] = result; },
                    [&] {
                      if (++waits == 50) raise(SIGTERM);
                    }),
                Interrupted);
   ASSERT_EQ(results.size(), 2u);
-  for (const auto& [i, result] : results) EXPECT_TRUE(result.interrupted) << i << ": " << result.text;
+  for (const auto& [i, result] : results)
+    EXPECT_TRUE(result.interrupted) << i << ": " << result.text;
 }
 
 TEST(Slots, ATrainingKilledAnywhereResumesToTheSameBits) {
@@ -114,7 +124,8 @@ TEST(Slots, ATrainingKilledAnywhereResumesToTheSameBits) {
   for (int round = 0; round < 3; ++round) {
     const fs::path checkpoint = RunDirectory{killed}.checkpoint();
     const auto job = [&](size_t) {
-      const fs::file_time_type before = fs::exists(checkpoint) ? fs::last_write_time(checkpoint) : fs::file_time_type::min();
+      const fs::file_time_type before =
+          fs::exists(checkpoint) ? fs::last_write_time(checkpoint) : fs::file_time_type::min();
       std::thread([=] {
         while (!fs::exists(checkpoint) || fs::last_write_time(checkpoint) <= before)
           std::this_thread::sleep_for(std::chrono::microseconds(200));

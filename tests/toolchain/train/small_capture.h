@@ -1,5 +1,6 @@
-// A small real capture for tests of the trainer: the mannequin, swinging, from 8 cameras at 128x128, with a body package at T = 32. Made
-// once per program, about two seconds, in a folder that is removed at the end.
+// A small real capture for tests of the trainer: the mannequin, swinging, from 8 cameras at
+// 128x128, with a body package at T = 32. Made once per program, about two seconds, in a folder
+// that is removed at the end.
 #pragma once
 
 #include <cmath>
@@ -28,7 +29,9 @@ class TemporaryFolder {
   }
   ~TemporaryFolder() { std::filesystem::remove_all(path_); }
   TemporaryFolder(const TemporaryFolder&) = delete;
-  std::string path(const std::string& name = "") const { return (name.empty() ? path_ : path_ / name).string(); }
+  std::string path(const std::string& name = "") const {
+    return (name.empty() ? path_ : path_ / name).string();
+  }
 
  private:
   std::filesystem::path path_;
@@ -65,7 +68,8 @@ struct SmallCapture {
       for (uint32_t j = 0; j < body::kJointCount; ++j) {
         const double angle = 0.25 * std::sin(0.2 * f + 1.7 * j);
         clip.rotations.insert(clip.rotations.end(),
-                              {static_cast<float>(std::cos(angle / 2)), static_cast<float>(std::sin(angle / 2)), 0, 0});
+                              {static_cast<float>(std::cos(angle / 2)),
+                               static_cast<float>(std::sin(angle / 2)), 0, 0});
       }
     }
     return clip;

@@ -1,5 +1,5 @@
-// Training itself, at the smallest size that shows anything: it beats a flat colour, a resumed run equals an uninterrupted one, bad input
-// is refused.
+// Training itself, at the smallest size that shows anything: it beats a flat colour, a resumed run
+// equals an uninterrupted one, bad input is refused.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -25,8 +25,11 @@ using testing_tools::small_capture;
 using testing_tools::TemporaryFolder;
 
 TrainRequest request(const std::string& run, uint64_t iterations) {
-  TrainRequest request{
-      .data = small_capture().data, .body = small_capture().body, .run = run, .settings = preset_settings("nano"), .quiet = true};
+  TrainRequest request{.data = small_capture().data,
+                       .body = small_capture().body,
+                       .run = run,
+                       .settings = preset_settings("nano"),
+                       .quiet = true};
   request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
   request.settings.threads = 1;
   return request;
@@ -80,7 +83,8 @@ TEST(Training, ResumedAfterAnInterruptEqualsAnUninterruptedRunBitwise) {
   TrainRequest straight = request(folder.path("straight"), 90);
   straight.settings.threads = 2;
   straight.settings.views_per_pose = 3;
-  straight.settings.background = TrainingBackground::kRandom;  // the counter-based generator has to go on as well
+  straight.settings.background =
+      TrainingBackground::kRandom;  // the counter-based generator has to go on as well
   train_avatar(straight);
   TrainRequest broken = straight;
   broken.run = folder.path("broken");
@@ -91,7 +95,8 @@ TEST(Training, ResumedAfterAnInterruptEqualsAnUninterruptedRunBitwise) {
   broken.resume = true;
   const TrainResult result = train_avatar(broken);
   EXPECT_EQ(result.state.iteration, 90u);
-  EXPECT_EQ(bytes_of(RunDirectory{broken.run}.weights()), bytes_of(RunDirectory{straight.run}.weights()));
+  EXPECT_EQ(bytes_of(RunDirectory{broken.run}.weights()),
+            bytes_of(RunDirectory{straight.run}.weights()));
 }
 
 TEST(Training, OfSeveralPosesAnIterationGivesTheSameBitsOnOneThreadAndOnTwo) {
@@ -108,13 +113,16 @@ TEST(Training, OfSeveralPosesAnIterationGivesTheSameBitsOnOneThreadAndOnTwo) {
   in_turn.stop_after = 0;
   in_turn.resume = true;
   train_avatar(in_turn);
-  EXPECT_EQ(bytes_of(RunDirectory{in_turn.run}.weights()), bytes_of(RunDirectory{side_by_side.run}.weights()));
+  EXPECT_EQ(bytes_of(RunDirectory{in_turn.run}.weights()),
+            bytes_of(RunDirectory{side_by_side.run}.weights()));
   TrainRequest one = request(folder.path("one"), 30);
   train_avatar(one);
-  EXPECT_NE(bytes_of(RunDirectory{one.run}.weights()), bytes_of(RunDirectory{side_by_side.run}.weights()));
+  EXPECT_NE(bytes_of(RunDirectory{one.run}.weights()),
+            bytes_of(RunDirectory{side_by_side.run}.weights()));
 }
 
-// The mannequin has neither hair nor skirt, so the weights to start from hold all Gaussians 10 cm beside it.
+// The mannequin has neither hair nor skirt, so the weights to start from hold all Gaussians 10 cm
+// beside it.
 TEST(Training, WithStandoffGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
   const TemporaryFolder folder;
   TensorFile weights = read_tensor_file(RunDirectory{trained_run()}.weights());
@@ -137,8 +145,10 @@ TEST(Training, WithStandoffGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
   two.stop_after = 0;
   two.resume = true;
   train_avatar(two);
-  EXPECT_TRUE(bytes_of(RunDirectory{one.run}.weights()) == bytes_of(RunDirectory{two.run}.weights()));
-  EXPECT_FALSE(bytes_of(RunDirectory{one.run}.weights()) == bytes_of(RunDirectory{off.run}.weights()));
+  EXPECT_TRUE(bytes_of(RunDirectory{one.run}.weights()) ==
+              bytes_of(RunDirectory{two.run}.weights()));
+  EXPECT_FALSE(bytes_of(RunDirectory{one.run}.weights()) ==
+               bytes_of(RunDirectory{off.run}.weights()));
 }
 
 TEST(Lanes, PassOnWhatTheLowestLaneThrewAndGoOn) {
@@ -171,12 +181,14 @@ TEST(Training, WithFrozenPoseSeesOneInputPerRootOrientation) {
   TrainSettings settings = preset_settings("nano");
   settings.freeze_pose = true;
   const PackageFile body = open_package(small_capture().body, PackageKind::kBody);
-  const dataset::Dataset data = dataset::Dataset::open(small_capture().data, {.body = &body.package.body()});
+  const dataset::Dataset data =
+      dataset::Dataset::open(small_capture().data, {.body = &body.package.body()});
   const AvatarModel frozen(body.package.body(), data.shape(), settings, false);
   settings.freeze_pose = false;
   const AvatarModel moving(body.package.body(), data.shape(), settings, false);
   OwnedPose a = frozen.from_capture(data.frames()[0]), b = frozen.from_capture(data.frames()[9]);
-  std::copy_n(a.rotations.begin(), 4, b.rotations.begin());  // one root orientation, two articulations
+  std::copy_n(a.rotations.begin(), 4,
+              b.rotations.begin());  // one root orientation, two articulations
   EXPECT_TRUE(torch::equal(frozen.pose(a.view()).input, frozen.pose(b.view()).input));
   EXPECT_FALSE(torch::equal(moving.pose(a.view()).input, moving.pose(b.view()).input));
   // The Gaussians are skinned with the true pose all the same.
@@ -219,17 +231,23 @@ TEST(Training, PutsTheRootOfTheMeanTemplateWhereThePersonsWas) {
   TrainSettings settings = preset_settings("nano");
   settings.template_mode = TemplateMode::kMean;
   const PackageFile body = open_package(small_capture().body, PackageKind::kBody);
-  const dataset::Dataset data = dataset::Dataset::open(small_capture().data, {.body = &body.package.body()});
+  const dataset::Dataset data =
+      dataset::Dataset::open(small_capture().data, {.body = &body.package.body()});
   const AvatarModel mean(body.package.body(), data.shape(), settings, false);
-  std::vector<float> joints(body.package.body().joint_position_m.size()), texels(body.package.body().texel_position_m.size());
+  std::vector<float> joints(body.package.body().joint_position_m.size()),
+      texels(body.package.body().texel_position_m.size());
   shape_body(body.package.body(), data.shape(), joints, texels);
   const OwnedPose pose = mean.from_capture(data.frames()[0]);
   const std::array<float, 3> root = root_position(body.package.body().mean_skeleton(), pose.view());
-  for (int k = 0; k < 3; ++k) EXPECT_NEAR(root[k], joints[k] + data.frames()[0].root_translation_m[k], 1e-6);
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(root[k], joints[k] + data.frames()[0].root_translation_m[k], 1e-6);
 }
 
 TEST(SampleFeed, CropHoldsTheMaskAndItsMargin) {
-  dataset::CaptureImage image{.width_px = 20, .height_px = 10, .rgb = std::vector<uint8_t>(600, 7), .alpha = std::vector<uint8_t>(200, 0)};
+  dataset::CaptureImage image{.width_px = 20,
+                              .height_px = 10,
+                              .rgb = std::vector<uint8_t>(600, 7),
+                              .alpha = std::vector<uint8_t>(200, 0)};
   image.alpha[3 * 20 + 5] = 9;
   image.alpha[6 * 20 + 18] = 255;
   const CroppedImage crop = crop_to_mask(image, 2);
@@ -277,7 +295,8 @@ TEST(TrainingInput, ADamagedImageStopsTheRunAndIsNamed) {
   const TemporaryFolder folder;
   fs::copy(small_capture().data, folder.path("data"), fs::copy_options::recursive);
   for (const auto& entry : fs::recursive_directory_iterator(folder.path("data") + "/images_lr")) {
-    if (entry.path().extension() == ".jpg") fs::resize_file(entry.path(), fs::file_size(entry.path()) * 3 / 4);
+    if (entry.path().extension() == ".jpg")
+      fs::resize_file(entry.path(), fs::file_size(entry.path()) * 3 / 4);
   }
   TrainRequest damaged = request(folder.path("run"), 5);
   damaged.data = folder.path("data");
@@ -292,10 +311,12 @@ TEST(TrainingInput, ACutOffCheckpointIsRefusedByName) {
   fs::resize_file(RunDirectory{stopped.run}.checkpoint(), 1000);
   stopped.resume = true;
   stopped.stop_after = 0;
-  EXPECT_NE(error_of(stopped).find("checkpoint.safetensors"), std::string::npos) << error_of(stopped);
+  EXPECT_NE(error_of(stopped).find("checkpoint.safetensors"), std::string::npos)
+      << error_of(stopped);
 }
 
-// Files above this size cannot be written while it lives: what a full disk looks like to a program, without one.
+// Files above this size cannot be written while it lives: what a full disk looks like to a program,
+// without one.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t limit_bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -314,7 +335,8 @@ class FullDisk {
 };
 
 size_t count_files(const std::string& folder) {
-  return static_cast<size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+  return static_cast<size_t>(
+      std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
 }
 
 TEST(Training, OnAFullDiskStopsWithOneLineAndGoesOnFromTheLastCheckpoint) {
@@ -331,7 +353,8 @@ TEST(Training, OnAFullDiskStopsWithOneLineAndGoesOnFromTheLastCheckpoint) {
   full.resume = true;
   {
     const FullDisk disk(checkpoint.size() / 2);
-    EXPECT_NE(error_of(full).find("checkpoint.safetensors: cannot write"), std::string::npos) << error_of(full);
+    EXPECT_NE(error_of(full).find("checkpoint.safetensors: cannot write"), std::string::npos)
+        << error_of(full);
   }
   EXPECT_EQ(bytes_of(run.checkpoint()), checkpoint);
   EXPECT_EQ(count_files(full.run), files);  // nothing half-written is left behind

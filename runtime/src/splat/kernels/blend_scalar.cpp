@@ -1,12 +1,13 @@
 // The blend, in scalar code: the specification of every other kernel.
 //
-// Per splat the exact span of its ellipse in every row, then per pixel alpha, the cut, the stop, the sum. The span only skips pixels that
-// the cut would reject anyway (reach has slack above rounding), so neither it nor its widening to whole blocks shows in the picture. The
-// pixel program has no branches and no two pixels share a sum, so a compiler may run several pixels at a time with the same bits
-// (runtime/CMakeLists.txt lets it).
+// Per splat the exact span of its ellipse in every row, then per pixel alpha, the cut, the stop,
+// the sum. The span only skips pixels that the cut would reject anyway (reach has slack above
+// rounding), so neither it nor its widening to whole blocks shows in the picture. The pixel program
+// has no branches and no two pixels share a sum, so a compiler may run several pixels at a time
+// with the same bits (runtime/CMakeLists.txt lets it).
 //
-// Based on: Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023, eq. 3 (front-to-back alpha blending) and its
-// rasterizer's constants in figurine/gaussian.h.
+// Based on: Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023, eq. 3
+// (front-to-back alpha blending) and its rasterizer's constants in figurine/gaussian.h.
 #include <cmath>
 
 #include "figurine/gaussian.h"
@@ -34,10 +35,10 @@ float clamp(float value, float low, float high) {
   return value < high ? value : high;
 }
 
-// Rows and columns count from the tile's first pixel; row_y holds the rows' centres in the image, middle_left the image's x of column 0's
-// centre.
-void find_spans(const Splat& splat, const float* __restrict row_y, float middle_left, float width, int32_t y_begin, int32_t y_end,
-                Spans& __restrict spans) {
+// Rows and columns count from the tile's first pixel; row_y holds the rows' centres in the image,
+// middle_left the image's x of column 0's centre.
+void find_spans(const Splat& splat, const float* __restrict row_y, float middle_left, float width,
+                int32_t y_begin, int32_t y_end, Spans& __restrict spans) {
   for (int32_t y = y_begin; y < y_end; ++y) {
     const float dy = row_y[y] - splat.mean_y;
     const float v = dy * splat.scale_v, v2 = v * v;
@@ -54,22 +55,26 @@ void find_spans(const Splat& splat, const float* __restrict row_y, float middle_
   }
 }
 
-// The pixel program, on the spans. Returns the number of contributions blended. Not inlined: inlined, GCC 14 loses __restrict and the
-// vector loop.
-[[gnu::noinline]] uint32_t blend_spans(const Splat& splat, const Spans& spans, int32_t y_begin, int32_t y_end, float alpha_cut,
-                                       const float* __restrict column_x, float* __restrict red, float* __restrict green,
-                                       float* __restrict blue, float* __restrict transmittance) {
+// The pixel program, on the spans. Returns the number of contributions blended. Not inlined:
+// inlined, GCC 14 loses __restrict and the vector loop.
+[[gnu::noinline]] uint32_t blend_spans(const Splat& splat, const Spans& spans, int32_t y_begin,
+                                       int32_t y_end, float alpha_cut,
+                                       const float* __restrict column_x, float* __restrict red,
+                                       float* __restrict green, float* __restrict blue,
+                                       float* __restrict transmittance) {
   const float scale_u = splat.scale_u, opacity = splat.opacity;
   const float splat_red = splat.red, splat_green = splat.green, splat_blue = splat.blue;
   uint32_t blended = 0;
   for (int32_t y = y_begin; y < y_end; ++y) {
     const float centre = spans.centre[y], v2 = spans.v2[y];
-    const int32_t begin = spans.begin[y], first = y * kTileSize + begin, count = spans.blocks[y] * kBlock;
+    const int32_t begin = spans.begin[y], first = y * kTileSize + begin,
+                  count = spans.blocks[y] * kBlock;
     for (int32_t i = 0; i < count; ++i) {
       const float u = (column_x[begin + i] - centre) * scale_u;
       const float weight = opacity * exp2_minus(u * u + v2);
       const float alpha = weight < kAlphaMax ? weight : kAlphaMax;
-      // The light that meets the contribution: none where it is below the cut or the pixel has stopped.
+      // The light that meets the contribution: none where it is below the cut or the pixel has
+      // stopped.
       const float before = transmittance[first + i];
       const float living = before > 0.0f ? before : 0.0f;
       const float light = weight >= alpha_cut ? living : 0.0f;
@@ -100,7 +105,8 @@ void clear(const Tile& tile) {
   // Pixels outside the image are stopped from the start: blocks may touch them, counts may not.
   for (int32_t y = 0; y < kTileSize; ++y) {
     for (int32_t x = 0; x < kTileSize; ++x) {
-      tile.pixels->transmittance[y * kTileSize + x] = y < tile.height && x < tile.width ? 1.0f : -1.0f;
+      tile.pixels->transmittance[y * kTileSize + x] =
+          y < tile.height && x < tile.width ? 1.0f : -1.0f;
     }
   }
 }
@@ -122,13 +128,15 @@ uint64_t blend_tile_scalar(const Tile& tile) {
     if (i % kSplatsPerCheck == kSplatsPerCheck - 1 && all_stopped(pixels)) break;
     if (i + kPrefetch < tile.count) __builtin_prefetch(&tile.splats[tile.order[i + kPrefetch]]);
     const Splat splat = tile.splats[tile.order[i]];
-    // Rows and columns relative to the tile, ends exclusive. A pixel centre exactly on a bound is beyond reach: it may count as in or out.
+    // Rows and columns relative to the tile, ends exclusive. A pixel centre exactly on a bound is
+    // beyond reach: it may count as in or out.
     const float middle_y = splat.mean_y - 0.5f - top;
-    const int32_t y_begin = static_cast<int32_t>(clamp(middle_y - splat.half_height + 1, 0, height));
+    const int32_t y_begin =
+        static_cast<int32_t>(clamp(middle_y - splat.half_height + 1, 0, height));
     const int32_t y_end = static_cast<int32_t>(clamp(middle_y + splat.half_height + 1, 0, height));
     find_spans(splat, row_y, left + 0.5f, width, y_begin, y_end, spans);
-    blended +=
-        blend_spans(splat, spans, y_begin, y_end, tile.alpha_cut, column_x, pixels.red, pixels.green, pixels.blue, pixels.transmittance);
+    blended += blend_spans(splat, spans, y_begin, y_end, tile.alpha_cut, column_x, pixels.red,
+                           pixels.green, pixels.blue, pixels.transmittance);
   }
   return blended;
 }
