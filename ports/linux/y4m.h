@@ -4,8 +4,9 @@
 // has no field for the matrix, so the choice follows what players assume: BT.601 up to 576 rows,
 // BT.709 above. With R'G'B' in [0,1] as stored (no transfer function is applied):
 //   Y' = Kr R' + (1 - Kr - Kb) G' + Kb B',   Cb = (B' - Y') / (2 (1 - Kb)),   Cr = (R' - Y') / (2
-//   (1 - Kr)), codes: round(16 + 219 Y'), round(128 + 224 Cb), round(128 + 224 Cr);   BT.601: Kr
-//   0.299, Kb 0.114; BT.709: Kr 0.2126, Kb 0.0722.
+//       (1 - Kr)),
+//   codes: round(16 + 219 Y'), round(128 + 224 Cb), round(128 + 224 Cr);   BT.601: Kr 0.299, Kb
+//       0.114; BT.709: Kr 0.2126, Kb 0.0722.
 // Chroma is the mean over the block's pixels; odd sizes repeat the last row or column. Based on:
 // ITU-R BT.601-7 and BT.709-6, section 3.
 #pragma once

@@ -2,11 +2,12 @@
 // capture (docs/capture.md), as cameras, poses and images.
 //
 //   ID/images_lr/CAM/0005_img.jpg        colour, at half the size that camera_intrinsics.json
-//   speaks of ID/fmask_lr/CAM/0005_img_fmask.png   foreground mask; soft alpha in our captures
+//       speaks of
+//   ID/fmask_lr/CAM/0005_img_fmask.png   foreground mask; soft alpha in our captures
 //   ID/camera_extrinsics.json, ID/camera_intrinsics.json, ID/camera_scale.pkl
 //   ID/smplx/smpl/000000.json            pose of frame 5: index = frame / 5 - 1
 //   ID/figurine.json                     ours only: seed, body, shape, splits, and full poses (87
-//   numbers cannot hold two hands)
+//       numbers cannot hold two hands)
 //
 // What a user of that data set stumbles over is handled here, once: intrinsics are halved,
 // translations are multiplied by the camera scale (a pickled float, parsed without unpickling),

@@ -16,7 +16,8 @@
 // bits. No member of another part is ever opened.
 //
 //   FEATURES.safetensors             when it is done: weights, and in its metadata where they come
-//   from FEATURES.safetensors.checkpoint  until then: what --resume needs
+//       from
+//   FEATURES.safetensors.checkpoint  until then: what --resume needs
 //
 // Based on: Wang et al., CosFace: Large Margin Cosine Loss for Deep Face Recognition, 2018, eq. 4;
 // Zhang et al., 2018.

@@ -4,17 +4,20 @@
 // All on stored sRGB values in [0,1], both pictures over the same background, errors pooled over
 // pixels, channels and images before the logarithm.
 //   foreground  pixels whose true alpha exceeds 0.5, over mid-grey. This is "PSNR" wherever a
-//   report says no more. crop        all pixels of the bounding box of true alpha > 0, over black:
-//   flattered by the black around the person, never a target. head        foreground pixels inside
-//   the projected head box. high-pass   sum of squares of (picture - 3x3 binomial blur) over
-//   foreground pixels whose eight neighbours are foreground too: prediction over truth.
-//               1 is as sharp as the truth; a blurred face passes PSNR and fails this.
+//               report says no more.
+//   crop        all pixels of the bounding box of true alpha > 0, over black: flattered by the
+//               black around the person, never a target.
+//   head        foreground pixels inside the projected head box.
+//   high-pass   sum of squares of (picture - 3x3 binomial blur) over foreground pixels whose eight
+//               neighbours are foreground too: prediction over truth. 1 is as sharp as the truth; a
+//               blurred face passes PSNR and fails this.
 //   difference  PSNR of (frame t+1 - frame t), prediction against truth, over pixels that are
-//   foreground in both true frames: shimmer. outline     true alpha above 0.5 against predicted:
-//   intersection over union, and the share of the truth that the prediction leaves uncovered: what
-//   hair or a skirt is worth that was not learnt. flat        PSNR of a person of one colour (the
-//   best one for the very pixels it is judged on) with a perfect mask: what dark clothes give for
-//   free.
+//               foreground in both true frames: shimmer.
+//   outline     true alpha above 0.5 against predicted: intersection over union, and the share of
+//               the truth that the prediction leaves uncovered: what hair or a skirt is worth that
+//               was not learnt.
+//   flat        PSNR of a person of one colour (the best one for the very pixels it is judged on)
+//               with a perfect mask: what dark clothes give for free.
 #pragma once
 
 #include <array>

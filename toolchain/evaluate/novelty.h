@@ -5,10 +5,11 @@
 // training members, D values of a member.
 //
 //   distance  of a sample to its nearest training member, beside those of training members to their
-//   nearest *other* one; in weights
+//             nearest *other* one; in weights
 //             (rms_distances) or in pictures (pooled_mse)
 //   copies    samples at most as far as the 5 % of training members that have the nearest
-//   neighbours blends    what a convex blend of few members leaves of a sample (convex_blend.h)
+//             neighbours
+//   blends    what a convex blend of few members leaves of a sample (convex_blend.h)
 //
 // Generators that pass need not be good: noise is novel. Held-out members are the row to resemble,
 // generation_baselines.h has the rows to beat.

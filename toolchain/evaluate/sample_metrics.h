@@ -5,12 +5,13 @@
 // Letters: S samples, R references, as many of one as of the other.
 //
 //   MMD    minimum matching distance: mean over references of the distance to the nearest sample.
-//   Blind to samples far from everything. COV    coverage: share of references that are the nearest
-//   reference of at least one sample. Blind to quality: samples far away count. 1-NNA leave-one-out
-//   accuracy of a 1-nearest-neighbour classifier that tells samples from references. 50 % is ideal;
-//   far *below* it, a
+//          Blind to samples far from everything.
+//   COV    coverage: share of references that are the nearest reference of at least one sample.
+//          Blind to quality: samples far away count.
+//   1-NNA  leave-one-out accuracy of a 1-nearest-neighbour classifier that tells samples from
+//          references. 50 % is ideal; far *below* it, a
 //          sample's nearest neighbour is a reference more often than chance has it: copies. So the
-//          distance from 50 stands beside it.
+//              distance from 50 stands beside it.
 //
 // Ties do not depend on the order of the items: all references that are equally near are met; of k
 // nearest neighbours, j of the item's own set, the item counts j / k. With references that a

@@ -3,9 +3,11 @@
 // channels, and back.
 //
 //   encoder  3 convolutions 3x3 of stride 2 (16, 32, 64 channels), a residual block, a convolution
-//   to mean and log-variance decoder  a convolution, a residual block, 3 transposed convolutions
-//   4x4 of stride 2 (32, 16, 1 channels) loss     mean square error of the values + kl_weight x
-//   mean over the latent values of KL(N(mean, variance) | N(0, 1))
+//            to mean and log-variance
+//   decoder  a convolution, a residual block, 3 transposed convolutions 4x4 of stride 2 (32, 16, 1
+//            channels)
+//   loss     mean square error of the values + kl_weight x mean over the latent values of
+//            KL(N(mean, variance) | N(0, 1))
 //
 // Neighbours in such a picture are neighbours in memory and nothing else, which is what the paper
 // holds against it.

@@ -6,12 +6,15 @@
 // shape), D values of a model vector, L tokens.
 //
 //   layer   one token a convolution and one for the shape: the standardised weights themselves (the
-//   paper) flat    the same values as one vector, zero-padded and cut into equal chunks (the
-//   paper's ablation, after Peebles et al. 2022) latent  what an autoencoder makes of the values,
-//   of one scale (the paper's ablation; autoencoder.h) basis   one token a convolution and one for
-//   the shape: coordinates in that token's principal directions, at most `rank` of them (ours;
+//           paper)
+//   flat    the same values as one vector, zero-padded and cut into equal chunks (the paper's
+//           ablation, after Peebles et al. 2022)
+//   latent  what an autoencoder makes of the values, of one scale (the paper's ablation;
+//           autoencoder.h)
+//   basis   one token a convolution and one for the shape: coordinates in that token's principal
+//           directions, at most `rank` of them (ours;
 //           the paper's future work). Members that lie outside the training members' span cannot be
-//           reached.
+//               reached.
 //
 // Based on: the paper, section 4.2 and its ablation; Erkoc et al., HyperDiffusion, 2023
 // (standardised weights, one token a layer).

@@ -4,8 +4,9 @@
 // Who is who comes from the environment:
 //
 //   RANK, WORLD_SIZE, MASTER_ADDR, MASTER_PORT              by hand, or by a launcher; they come
-//   first SLURM_PROCID, SLURM_STEP_NUM_TASKS, SLURM_STEP_NODELIST inside srun; where rank 0 is:
-//   MASTER_ADDR, or the step's first node
+//       first
+//   SLURM_PROCID, SLURM_STEP_NUM_TASKS, SLURM_STEP_NODELIST inside srun; where rank 0 is:
+//       MASTER_ADDR, or the step's first node
 //
 // Without them a process is alone: rank 0 of 1, for which everything here returns at once and
 // changes no bit. SLURM_NTASKS is not looked at, because a batch script outside srun has it, too,

@@ -8,15 +8,16 @@
 // of a cluster share a batch without a word (flat_trainer.h).
 //
 //   RUN/run.json                 command, settings, population (its content hash), machine; when
-//   done also iterations, seconds, and
+//                                done also iterations, seconds, and
 //                                seconds_per_evaluation of one vector
 //   RUN/log.csv                  iteration, seconds, learning rate, loss, loss of the validation
-//   members (empty if there are none) RUN/weights.safetensors      the denoiser, moving average:
-//   one tensor a parameter RUN/checkpoint.safetensors   what --resume needs
+//                                members (empty if there are none)
+//   RUN/weights.safetensors      the denoiser, moving average: one tensor a parameter
+//   RUN/checkpoint.safetensors   what --resume needs
 //   RUN/autoencoder.safetensors, autoencoder_checkpoint.safetensors, autoencoder_log.csv   of
-//   variant `latent`: the same, of what is
+//       variant `latent`: the same, of what is
 //                                trained first; its validation loss is the mean square error of a
-//                                standardised value
+//                                    standardised value
 //
 // Based on: the paper, section 4.2; Ho et al., DDPM, 2020; Song et al., Score-based models, 2021
 // (the moving average).

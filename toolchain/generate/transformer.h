@@ -1,7 +1,8 @@
 // The transformer that predicts clean weights from noisy ones: the paper's second network.
 //
 //   t_l = Proj_l(z_l) + position_l          one linear layer a token, because tokens have different
-//   lengths t_time = MLP(sinusoids of lambda)       a token of its own, first (HyperDiffusion)
+//       lengths
+//   t_time = MLP(sinusoids of lambda)       a token of its own, first (HyperDiffusion)
 //   blocks: t += Attention(LayerNorm(t));  t += W2 GELU(W1 LayerNorm(t))
 //   x_l = Unproj_l(LayerNorm(t_l))
 //

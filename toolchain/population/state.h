@@ -1,12 +1,14 @@
 // The folder in which a population grows (docs/population.md):
 //
 //   recipe.json                the recipe, as it was when the folder was begun; another one is
-//   refused split.json                 who is in which part; written before anything is trained
+//                              refused
+//   split.json                 who is in which part; written before anything is trained
 //   body.fgn                   the body of all
 //   initial/                   the shared initial weights: weights.safetensors when they are done,
-//   history.csv, the rounds before captures/ID, runs/ID       while a member is made; removed when
-//   it is done members/ID.fgn, ID.json    the avatar (float weights, no picture) and what it was
-//   measured to be; ID.jpg: held-out pictures beside the
+//                              history.csv, the rounds before
+//   captures/ID, runs/ID       while a member is made; removed when it is done
+//   members/ID.fgn, ID.json    the avatar (float weights, no picture) and what it was measured to
+//                              be; ID.jpg: held-out pictures beside the
 //                              truth
 //   members.csv                a table of all, written whenever one ends
 //   population.fgn             the package; written now and then, and at the end

@@ -1,11 +1,13 @@
 // The folder that one training leaves behind (docs/training.md):
 //
 //   run.json                 command, settings, data set, body, machine; when done also iterations,
-//   seconds and where they went log.csv                  iteration, seconds, learning rate, loss,
-//   PSNR: means of the iterations since the row before weights.safetensors      the UNet:
-//   layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out] checkpoint.safetensors   the same and
-//   what --resume needs: the optimiser's moments, iteration, seconds evaluation.json          by
-//   figurine-train evaluate reconstruction
+//                            seconds and where they went
+//   log.csv                  iteration, seconds, learning rate, loss, PSNR: means of the iterations
+//                            since the row before
+//   weights.safetensors      the UNet: layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out]
+//   checkpoint.safetensors   the same and what --resume needs: the optimiser's moments, iteration,
+//                            seconds
+//   evaluation.json          by figurine-train evaluate reconstruction
 //
 // Every file appears whole or not at all.
 #pragma once

@@ -2,8 +2,9 @@
 // own library in any language, and by forty lines here.
 //
 //   8 bytes little-endian: length of the header;   header: JSON {"__metadata__": {key: string},
-//   name: {"dtype": "F32", "shape": [...], "data_offsets": [begin, end]}};   data.   Only F32 is
-//   read and written. Files appear whole or not at all.
+//       name: {"dtype": "F32", "shape": [...],
+//   "data_offsets": [begin, end]}};   data.   Only F32 is read and written. Files appear whole or
+//       not at all.
 #pragma once
 
 #include <cstdint>

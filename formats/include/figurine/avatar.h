@@ -21,8 +21,9 @@ enum class TemplateMode : uint8_t { kMean, kShaped };
 
 // Head channels to Gaussians, per texel i with raw outputs h:
 //   offset = offset_scale_m * h[0:3];   scale = spacing_scale * texel_spacing_m[i] *
-//   exp(clamp(h[3:6], -max_log_scale, max_log_scale)); quaternion = (1,0,0,0) + h[6:10],
-//   normalised;   opacity = 1 / (1 + exp(-(h[10] + opacity_bias)));   SH = h[11:].
+//       exp(clamp(h[3:6], -max_log_scale, max_log_scale));
+//   quaternion = (1,0,0,0) + h[6:10], normalised;   opacity = 1 / (1 + exp(-(h[10] +
+//       opacity_bias)));   SH = h[11:].
 struct HeadDecoding {
   float offset_scale_m = 0.05f;
   float spacing_scale = 0.6f;

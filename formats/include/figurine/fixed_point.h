@@ -4,15 +4,17 @@
 //   real = scale (q - zero_point)
 //   weights      int8, symmetric (-127 to 127), one scale per output channel
 //   activations  int8, one scale and zero point per value; the input int16 with zero point 0: over
-//   a metre, int8 steps are 8 mm sums         int32, exact; the bias is int32 in units of input
-//   scale x weight scale convolution  q = clamp(round(float(sum) * multiplier) + zero_point),
-//   multiplier = input scale * weight scale / output scale in float32,
-//                in this association; ReLU clamps at the zero point. round is to nearest, ties to
-//                even
+//                a metre, int8 steps are 8 mm
+//   sums         int32, exact; the bias is int32 in units of input scale x weight scale
+//   convolution  q = clamp(round(float(sum) * multiplier) + zero_point), multiplier = input scale *
+//                weight scale / output scale in float32, in this association; ReLU clamps at the
+//                zero point. round is to nearest, ties to even
 //   max pool, concatenation   the integers as they are: inputs and output share one scale and zero
-//   point upsample     (9 a + 3 b + 3 c + d + 8) >> 4 of the four neighbours, edges repeated: what
-//   XNNPACK's 11-bit weights give for x2 head         the last layer: float(sum) * (input scale *
-//   weight scale), in float, every output with its own weight scale
+//                             point
+//   upsample     (9 a + 3 b + 3 c + d + 8) >> 4 of the four neighbours, edges repeated: what
+//                XNNPACK's 11-bit weights give for x2
+//   head         the last layer: float(sum) * (input scale * weight scale), in float, every output
+//                with its own weight scale
 //
 // Based on: Jacob et al., Quantization and Training of Neural Networks for Efficient
 // Integer-Arithmetic-Only Inference, 2018, eq. 1-4, with a float multiplier instead of their

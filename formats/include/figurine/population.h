@@ -7,7 +7,8 @@
 // J joints. Kernels and channels lie in the order of the layers.
 //
 //   weight = initial + scale * q   (kInt8: q in [-127, 127], one scale an output channel, both
-//   float operations rounded to nearest) weight = initial + difference  (kHalf)
+//                                  float operations rounded to nearest)
+//   weight = initial + difference  (kHalf)
 //
 // Biases, shape, decoding and statistics are stored as an avatar has them; the pose covariance is L
 // L^T of a lower triangle in half floats, so it is positive definite whatever the rounding.

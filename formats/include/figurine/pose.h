@@ -5,7 +5,8 @@
 // rest position. A pose gives every joint a rotation relative to its parent, and the root a
 // translation from its rest position:
 //   R_root = Q_root, p_root = r_root + translation;   R_j = R_parent Q_j, p_j = p_parent + R_parent
-//   (r_j - r_parent);   B_j x = R_j (x - r_j) + p_j.
+//       (r_j - r_parent);   B_j x = R_j (x -
+//   r_j) + p_j.
 // Poses travel as quaternions (wxyz): no libm is needed on the way, and every operation here is
 // exactly rounded, so all CPUs agree. Based on: Loper et al., SMPL, 2015, eq. 2-4 (linear blend
 // skinning); normals by the inverse transpose of the blended linear part.

@@ -6,8 +6,9 @@
 // d_model, f = feed_forward, B blocks, R rows of all matrices together.
 //
 //   weights:  w = mean + sum over k of (x_k * direction_scale_k) * q_k      x: D values, of mean
-//   square about 1; q_k: int8 direction a matrix: y_n = sum over k of row_scale_n * q_nk * x_k +
-//   bias_n         n: rows; q: int8, -127 to 127
+//             square about 1; q_k: int8 direction
+//   a matrix: y_n = sum over k of row_scale_n * q_nk * x_k + bias_n         n: rows; q: int8, -127
+//       to 127
 //
 // All floats are finite and of magnitude at most 1e6, so that no matrix's result and no sampled
 // weight leaves the range of a float. What the numbers do is in docs/numerics.md, "Sampling on the

@@ -2,7 +2,8 @@
 // CPU and any number of threads.
 //
 //   input [T,T,C] float -> int16 -> first convolutions (our own) -> int8 -> XNNPACK (qs8, qc8w) ->
-//   int8 -> last convolution (our own) -> float
+//       int8 -> last convolution (our own) ->
+//   float
 //
 // XNNPACK has neither int16 inputs nor int32 results, hence our own convolutions at both ends. They
 // leave out what cannot matter: constant channels of the input are folded once into a map of

@@ -2,7 +2,8 @@
 // transformer is made of.
 //
 //   x_q = round(x / s), s = max |x| / A of every row of x, A = min(32767, (2^31 - 1) / (127
-//   columns)), rounded down y_n = float(sum over k of W_nk x_qk) * (row_scale_n * s) + b_n
+//       columns)), rounded down
+//   y_n = float(sum over k of W_nk x_qk) * (row_scale_n * s) + b_n
 //
 // With this A no int32 sum can overflow, so sums are exact and every CPU has the same bits; int16
 // keeps the rounding of x (14 bits and more) far below that of W.
