@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/src/base/stage_clock.h"
 #include "runtime/src/pose/posed_avatar.h"
 #include "runtime/src/splat/rasterizer.h"
-#include "runtime/src/stage_clock.h"
 
 namespace figurine {
 namespace {
@@ -48,30 +48,6 @@ Status validate_gaussians(const GaussianView& gaussians, size_t index) {
 }
 
 }  // namespace
-
-const char* to_string(Stage stage) {
-  switch (stage) {
-    case Stage::kMaps:
-      return "maps";
-    case Stage::kNetwork:
-      return "network";
-    case Stage::kDecode:
-      return "decode";
-    case Stage::kSkin:
-      return "skin";
-    case Stage::kProject:
-      return "project";
-    case Stage::kBin:
-      return "bin";
-    case Stage::kSort:
-      return "sort";
-    case Stage::kBlend:
-      return "blend";
-    case Stage::kResolve:
-      return "resolve";
-  }
-  return "unknown stage";
-}
 
 const char* network_library() { return "XNNPACK " FIGURINE_XNNPACK_VERSION; }
 

@@ -8,8 +8,8 @@
 
 #include "figurine/fixed_point.h"
 #include "figurine/network.h"
-#include "runtime/src/memory.h"
-#include "runtime/src/nn/thread_pool.h"
+#include "runtime/src/base/memory.h"
+#include "runtime/src/base/thread_pool.h"
 #include "runtime/src/nn/xnnpack_runtime.h"
 
 namespace figurine::bench {

@@ -1,6 +1,6 @@
 // The runtime's own exp, exp2, log2, erf and logistic against double libm, over dense samples of
 // the floats of their domains.
-#include "runtime/src/float_math.h"
+#include "runtime/src/base/float_math.h"
 
 #include <gtest/gtest.h>
 

@@ -18,9 +18,9 @@
 
 #include "figurine/fixed_point.h"
 #include "figurine/network.h"
-#include "runtime/src/memory.h"
+#include "runtime/src/base/memory.h"
+#include "runtime/src/base/thread_pool.h"
 #include "runtime/src/nn/integer_convolution.h"
-#include "runtime/src/nn/thread_pool.h"
 #include "runtime/src/nn/xnnpack_runtime.h"
 
 namespace figurine {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "runtime/src/integer_dot.h"
+#include "runtime/src/base/integer_dot.h"
 
 namespace figurine {
 

@@ -15,7 +15,7 @@
 
 #include "figurine/fixed_point.h"
 #include "figurine/network.h"
-#include "runtime/src/memory.h"
+#include "runtime/src/base/memory.h"
 
 namespace figurine {
 

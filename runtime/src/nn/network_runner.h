@@ -10,8 +10,8 @@
 #include <span>
 
 #include "figurine/network.h"
-#include "runtime/src/memory.h"
-#include "runtime/src/nn/thread_pool.h"
+#include "runtime/src/base/memory.h"
+#include "runtime/src/base/thread_pool.h"
 #include "runtime/src/nn/xnnpack_runtime.h"
 
 namespace figurine {

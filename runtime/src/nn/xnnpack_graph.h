@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "figurine/network.h"
-#include "runtime/src/memory.h"
-#include "runtime/src/nn/thread_pool.h"
+#include "runtime/src/base/memory.h"
+#include "runtime/src/base/thread_pool.h"
 #include "runtime/src/nn/xnnpack_runtime.h"
 
 namespace figurine {

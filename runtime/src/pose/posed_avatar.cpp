@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/src/float_math.h"
+#include "runtime/src/base/float_math.h"
 
 namespace figurine {
 namespace {

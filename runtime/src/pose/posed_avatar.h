@@ -14,11 +14,11 @@
 #include "figurine/avatar.h"
 #include "figurine/body.h"
 #include "figurine/gaussian.h"
-#include "runtime/src/memory.h"
+#include "runtime/src/base/memory.h"
+#include "runtime/src/base/stage_clock.h"
+#include "runtime/src/base/thread_pool.h"
 #include "runtime/src/nn/fixed_point_runner.h"
 #include "runtime/src/nn/network_runner.h"
-#include "runtime/src/nn/thread_pool.h"
-#include "runtime/src/stage_clock.h"
 
 namespace figurine {
 

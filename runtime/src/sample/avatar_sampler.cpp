@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "figurine/double_math.h"
-#include "runtime/src/memory.h"
+#include "runtime/src/base/memory.h"
 #include "runtime/src/sample/device_transformer.h"
 #include "runtime/src/sample/noise.h"
 #include "runtime/src/sample/solver.h"

@@ -5,7 +5,7 @@
 #include <new>
 
 #include "figurine/double_math.h"
-#include "runtime/src/float_math.h"
+#include "runtime/src/base/float_math.h"
 
 namespace figurine {
 

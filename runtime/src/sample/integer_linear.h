@@ -13,8 +13,8 @@
 #include <cstdint>
 #include <span>
 
-#include "runtime/src/integer_dot.h"
-#include "runtime/src/memory.h"
+#include "runtime/src/base/integer_dot.h"
+#include "runtime/src/base/memory.h"
 
 namespace figurine {
 

@@ -9,7 +9,7 @@
 #include <array>
 #include <cstdint>
 
-#include "runtime/src/memory.h"
+#include "runtime/src/base/memory.h"
 
 namespace figurine {
 

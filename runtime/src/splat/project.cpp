@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/src/float_math.h"
+#include "runtime/src/base/float_math.h"
 
 namespace figurine {
 namespace {

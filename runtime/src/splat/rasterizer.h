@@ -15,14 +15,14 @@
 #include <optional>
 
 #include "figurine/camera.h"
+#include "figurine/frame.h"
 #include "figurine/gaussian.h"
-#include "figurine/renderer.h"
-#include "runtime/src/memory.h"
-#include "runtime/src/nn/thread_pool.h"
+#include "runtime/src/base/memory.h"
+#include "runtime/src/base/stage_clock.h"
+#include "runtime/src/base/thread_pool.h"
 #include "runtime/src/splat/depth_sort.h"
 #include "runtime/src/splat/kernels/blend.h"
 #include "runtime/src/splat/project.h"
-#include "runtime/src/stage_clock.h"
 
 namespace figurine {
 

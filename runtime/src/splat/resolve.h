@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "figurine/renderer.h"
+#include "figurine/frame.h"
 #include "runtime/src/splat/kernels/blend.h"
 
 namespace figurine {

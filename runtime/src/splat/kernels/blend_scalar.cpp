@@ -11,7 +11,7 @@
 #include <cmath>
 
 #include "figurine/gaussian.h"
-#include "runtime/src/float_math.h"
+#include "runtime/src/base/float_math.h"
 #include "runtime/src/splat/kernels/blend.h"
 
 namespace figurine::kernels {

@@ -1,4 +1,4 @@
-#include "runtime/src/nn/thread_pool.h"
+#include "runtime/src/base/thread_pool.h"
 
 #include <pthreadpool.h>
 

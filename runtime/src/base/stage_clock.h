@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "figurine/renderer.h"
+#include "figurine/frame.h"
 
 namespace figurine {
 
