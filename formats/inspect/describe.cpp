@@ -191,11 +191,13 @@ const char* template_name(TemplateMode mode) {
 }
 
 Json describe_decoding(const HeadDecoding& decoding) {
-  return {{"offset_scale_m", number(decoding.offset_scale_m)},
-          {"spacing_scale", number(decoding.spacing_scale)},
-          {"max_log_scale", number(decoding.max_log_scale)},
-          {"opacity_bias", number(decoding.opacity_bias)},
-          {"sh_degree", decoding.sh_degree}};
+  Json json{{"offset_scale_m", number(decoding.offset_scale_m)},
+            {"spacing_scale", number(decoding.spacing_scale)},
+            {"max_log_scale", number(decoding.max_log_scale)},
+            {"opacity_bias", number(decoding.opacity_bias)},
+            {"sh_degree", decoding.sh_degree}};
+  if (decoding.max_offset != 0) json["max_offset"] = number(decoding.max_offset);
+  return json;
 }
 
 Json describe_avatar(const Avatar& avatar) {

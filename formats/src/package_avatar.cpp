@@ -30,7 +30,8 @@ Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, 
          .spacing_scale = table.spacing_scale(),
          .max_log_scale = table.max_log_scale(),
          .opacity_bias = table.opacity_bias(),
-         .sh_degree = table.sh_degree()};
+         .sh_degree = table.sh_degree(),
+         .max_offset = table.max_offset()};
   const auto within = [](float value, float max) { return value > 0 && value <= max; };
   const std::string field = concatenate({owner, ".decoding."});
   if (!within(out.offset_scale_m, 10))
@@ -41,6 +42,8 @@ Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, 
     return corrupt(field + "max_log_scale", "is not above 0 and at most 20");
   if (!(std::fabs(out.opacity_bias) <= 100))
     return corrupt(field + "opacity_bias", "is not within -100 and 100");
+  if (out.max_offset != 0 && !within(out.max_offset, 1000))
+    return corrupt(field + "max_offset", "is neither 0 nor above it and at most 1000");
   if (out.sh_degree > kMaxShDegree) return corrupt(field + "sh_degree", "is above ", kMaxShDegree);
   return {};
 }

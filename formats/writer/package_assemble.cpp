@@ -88,7 +88,7 @@ schema::MapStatistics build_map_statistics(const MapStatistics& statistics) {
 
 Offset<schema::HeadDecoding> build_decoding(FlatBufferBuilder& b, const HeadDecoding& d) {
   return schema::CreateHeadDecoding(b, d.offset_scale_m, d.spacing_scale, d.max_log_scale,
-                                    d.opacity_bias, d.sh_degree);
+                                    d.opacity_bias, d.sh_degree, d.max_offset);
 }
 
 Offset<schema::Network> build_network(FlatBufferBuilder& b, const Network& network) {

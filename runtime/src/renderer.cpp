@@ -7,8 +7,11 @@
 #include <vector>
 
 #include "runtime/src/base/stage_clock.h"
+#include "runtime/src/kernels/table.h"
 #include "runtime/src/pose/posed_avatar.h"
+#include "runtime/src/splat/gaussian_blocks.h"
 #include "runtime/src/splat/rasterizer.h"
+#include "runtime/src/splat/view.h"
 
 namespace figurine {
 namespace {
@@ -34,15 +37,16 @@ Status validate_target(const ImageTarget& target, const Camera& camera) {
   return {};
 }
 
+// The words of an error are put together only where there is one: a frame allocates nothing.
 Status validate_gaussians(const GaussianView& gaussians, size_t index) {
-  const std::string where = "gaussians[" + std::to_string(index) + "]: ";
+  const auto where = [&] { return "gaussians[" + std::to_string(index) + "]: "; };
   if (gaussians.sh_degree > kMaxShDegree)
-    return invalid(where + "SH degree " + std::to_string(gaussians.sh_degree) + " is above 3");
+    return invalid(where() + "SH degree " + std::to_string(gaussians.sh_degree) + " is above 3");
   const size_t n = gaussians.count;
   if (gaussians.position_m.size() != 3 * n || gaussians.covariance_factor.size() != 9 * n ||
       gaussians.opacity.size() != n ||
       gaussians.sh.size() != 3 * n * sh_coefficients(gaussians.sh_degree)) {
-    return invalid(where + "the arrays' sizes do not fit the count of " + std::to_string(n));
+    return invalid(where() + "the arrays' sizes do not fit the count of " + std::to_string(n));
   }
   return {};
 }
@@ -52,63 +56,113 @@ Status validate_gaussians(const GaussianView& gaussians, size_t index) {
 const char* network_library() { return "XNNPACK " FIGURINE_XNNPACK_VERSION; }
 
 struct Renderer::Impl {
-  Impl(ThreadPool&& threads, uint64_t (*clock)())
-      : pool(std::move(threads)), now_ns(clock), rasterizer(pool) {}
+  Impl(ThreadPool&& threads, const RendererOptions& options, const KernelTable& table)
+      : pool(std::move(threads)), now_ns(options.now_ns), kernels(table), rasterizer(pool, table) {}
 
-  Status validate(const Frame& frame, const ImageTarget& target, uint64_t& gaussian_count) const {
-    FIG_RETURN_IF_ERROR(validate_camera(frame.camera));
-    FIG_RETURN_IF_ERROR(validate_target(target, frame.camera));
-    if (!(frame.splat.alpha_cut > 0 && frame.splat.alpha_cut <= 0.5f))
-      return invalid("alpha cut: must be above 0 and at most 0.5");
-    if (frame.background) {
-      for (float channel : *frame.background) {
-        if (!std::isfinite(channel)) return invalid("background: must be finite");
-      }
-    }
-    gaussian_count = 0;
-    for (size_t i = 0; i < frame.avatars.size(); ++i) {
-      FIG_RETURN_IF_ERROR(validate_avatar(frame.avatars[i].avatar, frame.avatars[i].pose)
-                              .within("avatars[" + std::to_string(i) + "]"));
-      gaussian_count += avatars[static_cast<size_t>(frame.avatars[i].avatar)]->body().texel_count();
-    }
-    for (size_t i = 0; i < frame.gaussians.size(); ++i) {
-      FIG_RETURN_IF_ERROR(validate_gaussians(frame.gaussians[i], i));
-      gaussian_count += frame.gaussians[i].count;
-    }
-    if (gaussian_count > kMaxGaussians) {
-      return Status(StatusCode::kLimitExceeded, "frame: " + std::to_string(gaussian_count) +
-                                                    " Gaussians, at most " +
-                                                    std::to_string(kMaxGaussians));
-    }
-    return {};
-  }
+  // Fails, or says how many blocks of Gaussians the frame has at most.
+  Status validate(const Frame& frame, const ImageTarget& target, uint32_t& blocks) const;
+  Status validate_avatar(AvatarId id, const PoseView& pose) const;
+  Result<const BodyBlocks*> blocks_of(const Body& body);
+  Status add(const FrameAvatar& seen, const kernels::View& view, const LeaveOut& leave_out,
+             StageClock& clock, FrameStatistics& statistics);
 
-  Status validate_avatar(AvatarId id, const PoseView& pose) const {
-    if (static_cast<size_t>(id) >= avatars.size()) return invalid("no avatar of this id was added");
-    return validate_pose(pose, avatars[static_cast<size_t>(id)]->body().joint_count());
-  }
+  PosedAvatar& avatar(AvatarId id) { return *avatars[static_cast<size_t>(id)]; }
+  const PosedAvatar& avatar(AvatarId id) const { return *avatars[static_cast<size_t>(id)]; }
 
-  Result<GaussianView> pose_avatar(AvatarId id, const PoseView& pose, StageClock& clock) {
-    PosedAvatar& avatar = *avatars[static_cast<size_t>(id)];
-    FIG_RETURN_IF_ERROR(avatar.pose(pose, gaussians, clock));
-    return gaussians.view(avatar.body().texel_count(), avatar.sh_degree());
-  }
+  struct SharedBody {
+    const uint32_t* texel;  // where the body's arrays lie tells bodies apart
+    BodyBlocks blocks;
+  };
 
   ThreadPool pool;
   uint64_t (*now_ns)();
+  const KernelTable& kernels;
+  std::vector<std::unique_ptr<SharedBody>> bodies;
   std::vector<std::unique_ptr<PosedAvatar>> avatars;
-  GaussianArrays gaussians;  // of one avatar at a time
+  PoseScratch scratch;
+  GaussianArrays gaussians;  // of pose_avatar()
   Rasterizer rasterizer;
   FrameStatistics statistics;
 };
+
+Status Renderer::Impl::validate(const Frame& frame, const ImageTarget& target,
+                                uint32_t& blocks) const {
+  FIG_RETURN_IF_ERROR(validate_camera(frame.camera));
+  FIG_RETURN_IF_ERROR(validate_target(target, frame.camera));
+  if (!(frame.splat.alpha_cut > 0 && frame.splat.alpha_cut <= 0.5f))
+    return invalid("alpha cut: must be above 0 and at most 0.5");
+  if (frame.background) {
+    for (float channel : *frame.background) {
+      if (!std::isfinite(channel)) return invalid("background: must be finite");
+    }
+  }
+  uint64_t gaussian_count = 0, all_blocks = 0;
+  for (size_t i = 0; i < frame.avatars.size(); ++i) {
+    const Status valid = validate_avatar(frame.avatars[i].avatar, frame.avatars[i].pose);
+    if (!valid.ok()) return valid.within("avatars[" + std::to_string(i) + "]");
+    gaussian_count += avatar(frame.avatars[i].avatar).body().texel_count();
+    all_blocks += avatar(frame.avatars[i].avatar).block_count();
+  }
+  for (size_t i = 0; i < frame.gaussians.size(); ++i) {
+    FIG_RETURN_IF_ERROR(validate_gaussians(frame.gaussians[i], i));
+    gaussian_count += frame.gaussians[i].count;
+    all_blocks += block_count(frame.gaussians[i].count);
+  }
+  if (gaussian_count > kMaxGaussians) {
+    return Status(StatusCode::kLimitExceeded, "frame: " + std::to_string(gaussian_count) +
+                                                  " Gaussians, at most " +
+                                                  std::to_string(kMaxGaussians));
+  }
+  blocks = static_cast<uint32_t>(all_blocks);
+  return {};
+}
+
+Status Renderer::Impl::validate_avatar(AvatarId id, const PoseView& pose) const {
+  if (static_cast<size_t>(id) >= avatars.size()) return invalid("no avatar of this id was added");
+  return validate_pose(pose, avatar(id).body().joint_count());
+}
+
+Result<const BodyBlocks*> Renderer::Impl::blocks_of(const Body& body) {
+  for (const std::unique_ptr<SharedBody>& shared : bodies) {
+    if (shared->texel == body.texel.data()) return &shared->blocks;
+  }
+  std::unique_ptr<SharedBody> shared(new (std::nothrow) SharedBody{body.texel.data(), {}});
+  if (shared == nullptr || !shared->blocks.ensure(body)) return out_of_memory("a body's texels");
+  bodies.push_back(std::move(shared));
+  return &bodies.back()->blocks;
+}
+
+Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view,
+                           const LeaveOut& leave_out, StageClock& clock,
+                           FrameStatistics& of_frame) {
+  PosedAvatar& posed = avatar(seen.avatar);
+  FIG_RETURN_IF_ERROR(posed.pose(seen.pose, &view, leave_out, scratch, clock));
+  const std::span<const uint32_t> wanted = scratch.wanted_blocks();
+  rasterizer.add(static_cast<uint32_t>(wanted.size()), posed.sh_degree(), Stage::kDecode, clock,
+                 [&](uint32_t i, kernels::GaussianBlock& block) {
+                   return posed.decode(scratch, wanted[i], block);
+                 });
+  for (uint32_t i = 0, next = 0; i < posed.block_count(); ++i) {
+    if (next < wanted.size() && wanted[next] == i) {
+      ++next;
+    } else {
+      of_frame.left_out.hidden_texels += lanes_of_block(i, posed.body().texel_count());
+    }
+  }
+  of_frame.macs += wanted.empty() ? 0 : posed.macs();
+  return {};
+}
 
 Renderer::Renderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Renderer::~Renderer() = default;
 
 Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& options) {
+  const Result<const KernelTable*> kernels =
+      kernels_for(options.isa.value_or(supported_isas().back()));
+  if (!kernels.ok()) return kernels.status();
   Result<ThreadPool> pool = ThreadPool::create(options.threads);
   if (!pool.ok()) return pool.status();
-  std::unique_ptr<Impl> impl(new (std::nothrow) Impl(std::move(pool).value(), options.now_ns));
+  std::unique_ptr<Impl> impl(new (std::nothrow) Impl(std::move(pool).value(), options, **kernels));
   if (impl == nullptr) return out_of_memory("a renderer");
   std::unique_ptr<Renderer> renderer(new (std::nothrow) Renderer(std::move(impl)));
   if (renderer == nullptr) return out_of_memory("a renderer");
@@ -129,59 +183,70 @@ Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
     return Status(StatusCode::kMismatch,
                   std::string("a body is wanted, not a ") + to_string(body.kind()));
   FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar, body));
+  const Result<const BodyBlocks*> blocks = impl_->blocks_of(body.body());
+  if (!blocks.ok()) return blocks.status();
   const Precision held =
       avatar.holds(Precision::kFixedPoint) ? Precision::kFixedPoint : Precision::kFloat32;
-  Result<std::unique_ptr<PosedAvatar>> posed =
-      PosedAvatar::create(avatar, body.body(), precision.value_or(held), impl_->pool);
+  Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(
+      avatar, body.body(), **blocks, precision.value_or(held), impl_->pool, impl_->kernels);
   if (!posed.ok()) return posed.status();
-  if (!impl_->gaussians.ensure(body.body().texel_count(), (*posed)->sh_degree()))
-    return out_of_memory("an avatar's Gaussians");
+  if (!impl_->scratch.ensure(body.body().joint_count(), (*blocks)->count()))
+    return out_of_memory("an avatar's pose");
   impl_->avatars.push_back(std::move(posed).value());
   return AvatarId(impl_->avatars.size() - 1);
 }
 
 Precision Renderer::precision(AvatarId avatar) const {
   FIG_CHECK(static_cast<size_t>(avatar) < impl_->avatars.size(), "an avatar that was added");
-  return impl_->avatars[static_cast<size_t>(avatar)]->precision();
+  return impl_->avatar(avatar).precision();
 }
 
 Status Renderer::render(const Frame& frame, const ImageTarget& target) {
   Impl& impl = *impl_;
-  uint64_t gaussian_count = 0;
-  FIG_RETURN_IF_ERROR(impl.validate(frame, target, gaussian_count));
-  FIG_RETURN_IF_ERROR(impl.rasterizer.begin(frame.camera, frame.splat.alpha_cut,
-                                            static_cast<uint32_t>(gaussian_count)));
+  uint32_t blocks = 0;
+  FIG_RETURN_IF_ERROR(impl.validate(frame, target, blocks));
+  const kernels::View view = make_view(frame.camera, frame.splat.alpha_cut);
+  FIG_RETURN_IF_ERROR(impl.rasterizer.begin(view, frame.leave_out, blocks));
 
   StageClock clock(impl.now_ns);
   FrameStatistics statistics;
   for (const FrameAvatar& seen : frame.avatars) {
-    const Result<GaussianView> gaussians = impl.pose_avatar(seen.avatar, seen.pose, clock);
-    if (!gaussians.ok()) return gaussians.status();
-    impl.rasterizer.add(*gaussians, clock);
-    statistics.macs += impl.avatars[static_cast<size_t>(seen.avatar)]->macs();
+    FIG_RETURN_IF_ERROR(impl.add(seen, view, frame.leave_out, clock, statistics));
   }
   for (const GaussianView& gaussians : frame.gaussians) impl.rasterizer.add(gaussians, clock);
   impl.rasterizer.draw(target, frame.background, clock);
 
   statistics.stage_ns = clock.stage_ns();
-  statistics.gaussians = impl.rasterizer.gaussians();
-  statistics.visible = impl.rasterizer.visible();
-  statistics.pairs = impl.rasterizer.pairs();
-  statistics.blends = impl.rasterizer.blends();
+  impl.rasterizer.report(statistics);
   impl.statistics = statistics;
   return {};
 }
 
-Result<GaussianView> Renderer::pose_avatar(AvatarId avatar, const PoseView& pose) {
-  FIG_RETURN_IF_ERROR(impl_->validate_avatar(avatar, pose));
+Result<GaussianView> Renderer::pose_avatar(AvatarId id, const PoseView& pose) {
+  FIG_RETURN_IF_ERROR(impl_->validate_avatar(id, pose));
+  PosedAvatar& posed = impl_->avatar(id);
+  const uint32_t count = posed.body().texel_count();
+  if (!impl_->gaussians.ensure(count, posed.sh_degree()))
+    return out_of_memory("an avatar's Gaussians");
   StageClock clock(nullptr);
-  return impl_->pose_avatar(avatar, pose, clock);
+  FIG_RETURN_IF_ERROR(posed.pose(pose, nullptr, {}, impl_->scratch, clock));
+  kernels::GaussianBlock block;
+  for (uint32_t i = 0; i < posed.block_count(); ++i) {
+    const uint32_t lanes = posed.decode(impl_->scratch, i, block);
+    impl_->gaussians.store(block, i, lanes, posed.sh_degree());
+  }
+  return impl_->gaussians.view(count, posed.sh_degree());
 }
+
+Isa Renderer::isa() const { return impl_->kernels.isa; }
 
 const FrameStatistics& Renderer::statistics() const { return impl_->statistics; }
 
 uint64_t Renderer::memory_bytes() const {
-  uint64_t bytes = impl_->rasterizer.memory_bytes() + impl_->gaussians.memory_bytes();
+  uint64_t bytes = impl_->rasterizer.memory_bytes() + impl_->gaussians.memory_bytes() +
+                   impl_->scratch.memory_bytes();
+  for (const std::unique_ptr<Impl::SharedBody>& body : impl_->bodies)
+    bytes += body->blocks.memory_bytes();
   for (const std::unique_ptr<PosedAvatar>& avatar : impl_->avatars) bytes += avatar->memory_bytes();
   return bytes;
 }

@@ -45,6 +45,9 @@ struct Image {
   uint32_t width = 0, height = 0;
   std::vector<double> rgb;            // [height,width,3] premultiplied
   std::vector<double> transmittance;  // [height,width]; alpha = 1 - T
+  // [height,width] 1 where a contribution came so close to a threshold (the cut, the stop) that
+  // float arithmetic may decide otherwise.
+  std::vector<uint8_t> doubtful;
 
   double alpha(size_t pixel) const { return 1 - transmittance[pixel]; }
   // Straight colour: 0 where alpha is 0.
@@ -174,6 +177,7 @@ inline double power_at(const Splat& splat, double dx, double dy) {
 
 struct Options {
   double alpha_cut = kAlphaCut;
+  double doubt = 1e-3;          // relative distance to a threshold within which a pixel is doubtful
   bool skip_far_pixels = true;  // leave out pixels outside the ellipse's bounding box (they fail
                                 // the alpha cut): only saves time
 };
@@ -189,7 +193,7 @@ inline Image render(const Gaussians& gaussians, const Camera& camera, const Opti
 
   const size_t pixels = size_t(camera.width_px) * camera.height_px;
   Image image{camera.width_px, camera.height_px, std::vector<double>(3 * pixels, 0.0),
-              std::vector<double>(pixels, 1.0)};
+              std::vector<double>(pixels, 1.0), std::vector<uint8_t>(pixels, 0)};
   std::vector<uint8_t> stopped(pixels, 0);
   for (const Splat& splat : splats) {
     if (!(splat.opacity >= options.alpha_cut)) continue;
@@ -212,8 +216,13 @@ inline Image render(const Gaussians& gaussians, const Camera& camera, const Opti
             power_at(splat, x + 0.5 - splat.mean_px[0], y + 0.5 - splat.mean_px[1]);
         if (power > 0) continue;
         const double alpha = std::min(double(kAlphaMax), splat.opacity * std::exp(power));
+        const auto doubt = [&](double value, double threshold) {
+          if (std::abs(value - threshold) < options.doubt * threshold) image.doubtful[pixel] = 1;
+        };
+        doubt(alpha, options.alpha_cut);
         if (alpha < options.alpha_cut) continue;
         const double next = image.transmittance[pixel] * (1 - alpha);
+        doubt(next, kTransmittanceStop);
         if (next < kTransmittanceStop) {
           stopped[pixel] = 1;
           continue;

@@ -63,7 +63,8 @@ TEST(IntegerLinear, IsTheProductButForTheRoundingOfItsInput) {
     std::vector<int16_t> storage(rounded.length() + 8);
     auto* aligned =
         reinterpret_cast<int16_t*>((reinterpret_cast<uintptr_t>(storage.data()) + 15) / 16 * 16);
-    multiply({matrix, row_scale, bias}, rounded, {aligned, rounded.length()}, y.data(), outputs);
+    multiply(best_kernels(), {matrix, row_scale, bias}, rounded, {aligned, rounded.length()},
+             y.data(), outputs);
     for (size_t m = 0; m < rows; ++m) {
       float largest = 0;
       for (size_t k = 0; k < columns; ++k)
@@ -94,7 +95,7 @@ TEST(IntegerLinear, TheLargestSumsAreExact) {
   rounded.round(x.data(), 1, kColumns, kColumns);
   alignas(16) int16_t row[kColumns];
   float y = 0;
-  multiply({matrix, row_scale, bias}, rounded, row, &y, 1);
+  multiply(best_kernels(), {matrix, row_scale, bias}, rounded, row, &y, 1);
   EXPECT_NEAR(y, 127.0 * kColumns * 2, 127.0 * kColumns * 2 * 1e-6);
 }
 
@@ -108,7 +109,7 @@ TEST(IntegerLinear, RowsOfZerosAndOfTinyValuesAreZero) {
   rounded.round(x.data(), 3, 3, 3);
   alignas(16) int16_t row[8];
   float y[3];
-  multiply({matrix, row_scale, bias}, rounded, row, y, 1);
+  multiply(best_kernels(), {matrix, row_scale, bias}, rounded, row, y, 1);
   for (const float value : y) EXPECT_EQ(value, 0.25f);
 }
 

@@ -18,6 +18,7 @@ SOUND = {
     "runtime/src/kernels/blend.h": "#include <stdint.h>\n",
     "runtime/src/splat/rasterizer.cpp": '#include "figurine/frame.h"\n#include "runtime/src/kernels/blend.h"\n',
     "runtime/include/figurine/frame.h": '#include "figurine/pose.h"\n',
+    "runtime/include/figurine/isa.h": "#include <cstdint>\n",
     "runtime/src/renderer.cpp": '#include "figurine/renderer.h"\n#include "runtime/src/nn/unet.cpp"\n',
     "ports/linux/files.h": '#include <sys/mman.h>\n#include <png.h>\n#include "figurine/pose.h"\n',
     "samples/figurine/main.cpp": '#include <CLI/CLI.hpp>\n#include "figurine/renderer.h"\n#include "ports/linux/files.h"\n',

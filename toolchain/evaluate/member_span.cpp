@@ -245,6 +245,10 @@ Avatar mix(const Avatar& a, const Avatar& b, double share, std::vector<float>& s
   mixed.decoding.offset_scale_m = between(a.decoding.offset_scale_m, b.decoding.offset_scale_m);
   mixed.decoding.spacing_scale = between(a.decoding.spacing_scale, b.decoding.spacing_scale);
   mixed.decoding.max_log_scale = between(a.decoding.max_log_scale, b.decoding.max_log_scale);
+  // Never less room than either end has; 0 is no bound.
+  mixed.decoding.max_offset = a.decoding.max_offset == 0 || b.decoding.max_offset == 0
+                                  ? 0
+                                  : std::max(a.decoding.max_offset, b.decoding.max_offset);
   mixed.decoding.opacity_bias = between(a.decoding.opacity_bias, b.decoding.opacity_bias);
   return mixed;
 }

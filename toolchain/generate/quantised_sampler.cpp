@@ -32,7 +32,7 @@ bool same(const MapStatistics& a, const MapStatistics& b) {
 bool same(const HeadDecoding& a, const HeadDecoding& b) {
   return a.offset_scale_m == b.offset_scale_m && a.spacing_scale == b.spacing_scale &&
          a.max_log_scale == b.max_log_scale && a.opacity_bias == b.opacity_bias &&
-         a.sh_degree == b.sh_degree;
+         a.sh_degree == b.sh_degree && a.max_offset == b.max_offset;
 }
 
 }  // namespace

@@ -102,6 +102,13 @@ void decode_texel(const HeadFrame& frame, uint32_t texel, const Scalar* h, Decod
   }
 }
 
+// The offset output within its bound, if it has one.
+template <class Scalar>
+Scalar bounded_offset(const HeadDecoding& decoding, Scalar h) {
+  const Scalar limit = Scalar(decoding.max_offset);
+  return limit == 0 ? h : (h < -limit ? -limit : (h > limit ? limit : h));
+}
+
 template <class Scalar>
 Scalar sigmoid(Scalar x) {
   return 1 / (1 + std::exp(-x));
@@ -143,7 +150,7 @@ void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads,
       Scalar canonical[3];
       for (int k = 0; k < 3; ++k)
         canonical[k] = Scalar(frame.texel_position_m[3 * size_t(i) + k]) +
-                       Scalar(frame.decoding.offset_scale_m) * h[k];
+                       Scalar(frame.decoding.offset_scale_m) * bounded_offset(frame.decoding, h[k]);
       for (int r = 0; r < 3; ++r) {
         const Scalar* row = &decoded.blended[4 * r];
         gaussians.position_m[3 * size_t(i) + r] =
@@ -186,9 +193,13 @@ void decode_head_backward(const HeadFrame& frame, const Scalar* head,
       decode_texel(frame, i, h, at);
       const Scalar* m = at.blended;
       // p = A (x + offset_scale h) + t
-      for (int k = 0; k < 3; ++k)
-        dh[k] = Scalar(frame.decoding.offset_scale_m) *
-                (m[k] * dp[0] + m[4 + k] * dp[1] + m[8 + k] * dp[2]);
+      for (int k = 0; k < 3; ++k) {
+        const bool moves =
+            frame.decoding.max_offset == 0 || std::abs(h[k]) <= Scalar(frame.decoding.max_offset);
+        dh[k] = moves ? Scalar(frame.decoding.offset_scale_m) *
+                            (m[k] * dp[0] + m[4 + k] * dp[1] + m[8 + k] * dp[2])
+                      : Scalar(0);
+      }
       // F = (A R) S: dS_j = sum_i dF_ij (AR)_ij; dR = A^T dF S
       Scalar d_rotation[9];
       for (int j = 0; j < 3; ++j) {

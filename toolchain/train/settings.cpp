@@ -85,17 +85,22 @@ const char* to_string(OptimiserKind kind) {
   return kind == OptimiserKind::kMuon ? "muon" : "adamw";
 }
 
+nlohmann::json to_json(const HeadDecoding& decoding) {
+  nlohmann::json json{{"offset_scale_m", decoding.offset_scale_m},
+                      {"spacing_scale", decoding.spacing_scale},
+                      {"max_log_scale", decoding.max_log_scale},
+                      {"opacity_bias", decoding.opacity_bias},
+                      {"sh_degree", decoding.sh_degree}};
+  if (decoding.max_offset != 0) json["max_offset"] = decoding.max_offset;
+  return json;
+}
+
 nlohmann::json to_json(const TrainSettings& s) {
   return {{"preset", s.preset},
           {"template", to_string(s.template_mode)},
           {"freeze_pose", s.freeze_pose},
           {"fourier_octaves", s.fourier_octaves},
-          {"decoding",
-           {{"offset_scale_m", s.decoding.offset_scale_m},
-            {"spacing_scale", s.decoding.spacing_scale},
-            {"max_log_scale", s.decoding.max_log_scale},
-            {"opacity_bias", s.decoding.opacity_bias},
-            {"sh_degree", s.decoding.sh_degree}}},
+          {"decoding", to_json(s.decoding)},
           {"seed", s.seed},
           {"init", s.init},
           {"learning_rate", s.schedule.peak},
@@ -134,7 +139,8 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
                   .spacing_scale = decoding.at("spacing_scale").get<float>(),
                   .max_log_scale = decoding.at("max_log_scale").get<float>(),
                   .opacity_bias = decoding.at("opacity_bias").get<float>(),
-                  .sh_degree = decoding.at("sh_degree").get<uint32_t>()};
+                  .sh_degree = decoding.at("sh_degree").get<uint32_t>(),
+                  .max_offset = decoding.value("max_offset", 0.0f)};
     s.seed = json.at("seed").get<uint64_t>();
     s.init = json.at("init").get<std::string>();
     s.schedule = {.peak = json.at("learning_rate").get<double>(),
@@ -174,6 +180,10 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     require(std::isfinite(value) && value > 0, where,
             "decoding: scales must be positive and finite");
   }
+  require(s.decoding.max_offset >= 0 && s.decoding.max_offset <= 1000, where,
+          "decoding.max_offset: must be 0 to 1000");
+  require(s.decoding.max_offset == 0 || s.standoff_weight == 0, where,
+          "decoding.max_offset: not together with stand-off, which knows of no bound");
   require(s.schedule.peak > 0 && std::isfinite(s.schedule.peak), where,
           "learning_rate: must be positive and finite");
   require(s.standoff_weight >= 0 && std::isfinite(s.standoff_weight), where,

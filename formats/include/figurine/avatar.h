@@ -20,10 +20,10 @@ namespace figurine {
 enum class TemplateMode : uint8_t { kMean, kShaped };
 
 // Head channels to Gaussians, per texel i with raw outputs h:
-//   offset = offset_scale_m * h[0:3];   scale = spacing_scale * texel_spacing_m[i] *
-//       exp(clamp(h[3:6], -max_log_scale, max_log_scale));
-//   quaternion = (1,0,0,0) + h[6:10], normalised;   opacity = 1 / (1 + exp(-(h[10] +
-//       opacity_bias)));   SH = h[11:].
+//   offset = offset_scale_m * clamp(h[0:3], -max_offset, max_offset), no clamp where max_offset is
+//   0; scale = spacing_scale * texel_spacing_m[i] * exp(clamp(h[3:6], -max_log_scale,
+//   max_log_scale)); quaternion = (1,0,0,0) + h[6:10], normalised; opacity = 1 / (1 + exp(-(h[10] +
+//   opacity_bias)));   SH = h[11:].
 struct HeadDecoding {
   float offset_scale_m = 0.05f;
   float spacing_scale = 0.6f;
@@ -31,6 +31,8 @@ struct HeadDecoding {
                                // active on trained poses
   float opacity_bias = 2.0f;
   uint32_t sh_degree = 0;
+  // With a bound, a device knows before the network has run which texels a camera cannot see.
+  float max_offset = 0;
 };
 
 // Mean and covariance of the training poses' body rotations, for telling how unusual a pose is:

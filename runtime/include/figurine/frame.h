@@ -32,6 +32,18 @@ struct SplatOptions {
   float alpha_cut = kAlphaCut;  // contributions below it are skipped; in (0, 0.5]
 };
 
+// What a frame need not compute because nobody would see it. Every omission here is exact: the
+// picture is the same to the bit with and without it, so a switch is for measuring what it is
+// worth. FrameStatistics::left_out counts.
+struct LeaveOut {
+  bool hidden_texels = true;  // texels that the camera cannot see, before the head is decoded; only
+                              // of avatars whose offsets have a bound (HeadDecoding::max_offset)
+  bool transparent = true;    // Gaussians whose opacity is below the alpha cut
+  bool outside = true;        // Gaussians that touch no pixel of the image
+  bool missed_tiles = true;   // tiles of a Gaussian's box that its ellipse does not reach
+  bool stopped = true;        // the rest of a tile's Gaussians once all of its pixels have stopped
+};
+
 struct FrameAvatar {
   AvatarId avatar{};
   PoseView pose;
@@ -44,6 +56,7 @@ struct Frame {
   std::optional<std::array<float, 3>>
       background;  // opaque colour behind; without it the image keeps its alpha
   SplatOptions splat;
+  LeaveOut leave_out;
 };
 
 enum class Stage : uint8_t {
@@ -67,6 +80,12 @@ struct FrameStatistics {
   uint64_t pairs = 0;                            // (Gaussian, tile)
   uint64_t blends = 0;                           // contributions blended into pixels
   uint64_t macs = 0;
+  struct LeftOut {
+    uint64_t hidden_texels = 0;
+    uint64_t transparent = 0, outside = 0;  // Gaussians
+    uint64_t missed_tiles = 0;              // (Gaussian, tile) pairs of boxes
+    uint64_t stopped = 0;                   // (Gaussian, tile) pairs behind stopped tiles
+  } left_out;
 };
 
 }  // namespace figurine

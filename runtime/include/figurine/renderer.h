@@ -17,6 +17,7 @@
 #include <optional>
 
 #include "figurine/frame.h"
+#include "figurine/isa.h"
 #include "figurine/package.h"
 #include "figurine/status.h"
 
@@ -26,6 +27,8 @@ struct RendererOptions {
   uint32_t threads = 1;  // 1 to 64
   // The runtime has no clock of its own: with one, render() fills stage_ns.
   uint64_t (*now_ns)() = nullptr;
+  // Which kernels run: the same pixels with every one. None: the largest set of supported_isas().
+  std::optional<Isa> isa;
 };
 
 // The library that evaluates networks, and its version: "XNNPACK 0.20241108". Frames in fixed point
@@ -35,6 +38,8 @@ const char* network_library();
 
 class Renderer {
  public:
+  // kInvalidArgument for options out of range, kUnsupported for an instruction set that is not
+  // there, kOutOfMemory.
   static Result<std::unique_ptr<Renderer>> create(const RendererOptions& options);
   ~Renderer();
   Renderer(const Renderer&) = delete;
@@ -60,6 +65,7 @@ class Renderer {
   // the next call. For export and inspection.
   Result<GaussianView> pose_avatar(AvatarId avatar, const PoseView& pose);
 
+  Isa isa() const;                            // of the kernels that run
   const FrameStatistics& statistics() const;  // of the last frame
   uint64_t memory_bytes() const;              // held now, XNNPACK's packed weights estimated
 

@@ -9,7 +9,7 @@
 namespace figurine {
 namespace {
 
-constexpr size_t kHeadChunk = 256;  // texels of one task
+constexpr size_t kGroupsPerTask = 16;
 
 bool is_first(const Layer& layer) { return layer.op == LayerOp::kConv2d && layer.inputs[0] == 0; }
 
@@ -98,10 +98,11 @@ void quantise_all(const float* __restrict from, float scale, size_t count, int16
 Result<std::unique_ptr<FixedPointRunner>> FixedPointRunner::create(const Network& network,
                                                                    const FixedPointNetwork& fixed,
                                                                    const FixedPointUse& use,
-                                                                   ThreadPool& pool) {
+                                                                   ThreadPool& pool,
+                                                                   const KernelTable& kernels) {
   FIG_RETURN_IF_ERROR(validate_fixed_point(network, fixed));
   const std::vector<ValueShape> shapes = *infer_shapes(network, false);
-  std::unique_ptr<FixedPointRunner> runner(new (std::nothrow) FixedPointRunner(pool));
+  std::unique_ptr<FixedPointRunner> runner(new (std::nothrow) FixedPointRunner(pool, kernels));
   if (runner == nullptr) return out_of_memory("a network");
   FIG_RETURN_IF_ERROR(runner->prepare(network, fixed, use, shapes));
   return runner;
@@ -144,7 +145,7 @@ Status FixedPointRunner::prepare_first(const Network& network, const FixedPointN
   FirstConvolution& first = first_.emplace_back();
   const ValueShape input{size_, network.input_channels};
   const size_t texels = size_t{size_} * size_;
-  if (!first.sums.prepare(layer, convolution, input, use.varying_channels, constants_) ||
+  if (!first.sums.prepare(kernels_, layer, convolution, input, use.varying_channels, constants_) ||
       !first.multiplier.ensure(layer.out_channels) || !first.active.ensure(texels) ||
       !first.output.ensure(texels * layer.out_channels)) {
     return out_of_memory("a network's first convolution");
@@ -192,7 +193,7 @@ Status FixedPointRunner::prepare_head(const Network& network, const FixedPointNe
   const Quantisation& quantisation = fixed.values[layer.inputs[0]];
   const bool reads_input = layer.inputs[0] == 0;
   if (!head_.prepare(
-          layer, convolution, input, reads_input ? use.varying_channels : input.channels,
+          kernels_, layer, convolution, input, reads_input ? use.varying_channels : input.channels,
           reads_input ? std::span<const int16_t>(constants_) : std::span<const int16_t>()) ||
       !head_scale_.ensure(layer.out_channels) ||
       !output_.ensure(use.wanted.size() * layer.out_channels)) {
@@ -218,7 +219,10 @@ Status FixedPointRunner::prepare_scratch() {
   // Tasks next to each other do not share a cache line.
   patch_stride_ = (patch_stride_ + 31) / 32 * 32;
   sums_stride_ = (sums_stride_ + 15) / 16 * 16;
-  const size_t tasks = std::max<size_t>(size_, (wanted_.size() + kHeadChunk - 1) / kHeadChunk);
+  const size_t groups = (wanted_.size() + kWantedGroup - 1) / kWantedGroup;
+  if (!all_groups_.ensure(groups)) return out_of_memory("a network's texels");
+  for (size_t group = 0; group < groups; ++group) all_groups_[group] = static_cast<uint32_t>(group);
+  const size_t tasks = std::max<size_t>(size_, (groups + kGroupsPerTask - 1) / kGroupsPerTask);
   if (!patches_.ensure(tasks * patch_stride_) || !sums_.ensure(tasks * sums_stride_))
     return out_of_memory("a network's sums");
   return {};
@@ -237,30 +241,40 @@ void FixedPointRunner::run_first(FirstConvolution& first, Texels texels, uint32_
     const size_t texel = size_t{y} * size_ + x;
     if (first.active[texel] != static_cast<uint8_t>(texels)) continue;
     first.sums.gather(map_, x, y, patch);
-    first.sums.sum(patch, x, y, sums);
+    first.sums.sum(kernels_, patch, x, y, sums);
     requantise_all(sums, first.multiplier.data(), first.zero_point, first.lowest, outputs,
                    first.output.data() + texel * outputs);
   }
 }
 
-void FixedPointRunner::run_head(size_t chunk) {
-  int16_t* patch = patches_.data() + chunk * patch_stride_;
-  int32_t* sums = sums_.data() + chunk * sums_stride_;
+void FixedPointRunner::run_head(std::span<const uint32_t> groups, size_t task) {
+  int16_t* patch = patches_.data() + task * patch_stride_;
+  int32_t* sums = sums_.data() + task * sums_stride_;
   const uint32_t outputs = head_.outputs();
-  for (size_t i = chunk * kHeadChunk; i < std::min((chunk + 1) * kHeadChunk, wanted_.size()); ++i) {
+  const auto run_texel = [&](size_t i) {
     const uint32_t x = wanted_[i] % head_size_, y = wanted_[i] / head_size_;
     if (head_input_ == nullptr) {
       head_.gather(map_, x, y, patch);
     } else {
       head_.gather(head_input_, head_zero_point_, x, y, patch);
     }
-    head_.sum(patch, x, y, sums);
+    head_.sum(kernels_, patch, x, y, sums);
     float* to = output_.data() + i * outputs;
     for (uint32_t o = 0; o < outputs; ++o) to[o] = static_cast<float>(sums[o]) * head_scale_[o];
+  };
+  const size_t begin = task * kGroupsPerTask;
+  for (const uint32_t group :
+       groups.subspan(begin, std::min(kGroupsPerTask, groups.size() - begin))) {
+    const size_t first = size_t{group} * kWantedGroup;
+    for (size_t i = first; i < std::min(first + kWantedGroup, wanted_.size()); ++i) run_texel(i);
   }
 }
 
 Status FixedPointRunner::run() {
+  return run(all_groups_.span((wanted_.size() + kWantedGroup - 1) / kWantedGroup));
+}
+
+Status FixedPointRunner::run(std::span<const uint32_t> groups) {
   pool_.for_each(size_, [&](size_t y) { quantise_row(static_cast<uint32_t>(y)); });
   for (FirstConvolution& first : first_) {
     pool_.for_each(size_,
@@ -268,15 +282,16 @@ Status FixedPointRunner::run() {
   }
   if (runtime_ != nullptr)
     FIG_RETURN_IF_ERROR(xnnpack_status(xnn_invoke_runtime(runtime_.get()), "running the network"));
-  pool_.for_each((wanted_.size() + kHeadChunk - 1) / kHeadChunk,
-                 [&](size_t chunk) { run_head(chunk); });
+  pool_.for_each((groups.size() + kGroupsPerTask - 1) / kGroupsPerTask,
+                 [&](size_t task) { run_head(groups, task); });
   return {};
 }
 
 uint64_t FixedPointRunner::memory_bytes() const {
   uint64_t bytes = input_.memory_bytes() + map_.memory_bytes() + middle_.memory_bytes() +
                    head_.memory_bytes() + head_scale_.memory_bytes() + output_.memory_bytes() +
-                   patches_.memory_bytes() + sums_.memory_bytes() + xnnpack_bytes_;
+                   patches_.memory_bytes() + sums_.memory_bytes() + all_groups_.memory_bytes() +
+                   xnnpack_bytes_;
   for (const FirstConvolution& first : first_) {
     bytes += first.sums.memory_bytes() + first.multiplier.memory_bytes() +
              first.active.memory_bytes() + first.output.memory_bytes();

@@ -20,6 +20,7 @@
 #include "figurine/network.h"
 #include "runtime/src/base/memory.h"
 #include "runtime/src/base/thread_pool.h"
+#include "runtime/src/kernels/table.h"
 #include "runtime/src/nn/integer_convolution.h"
 #include "runtime/src/nn/xnnpack_runtime.h"
 
@@ -38,10 +39,9 @@ class FixedPointRunner {
   // The network's weights are read here and not afterwards. The pool must outlive the runner.
   // Errors: kCorrupt of validate_fixed_point; kUnsupported where XNNPACK cannot run at all or not
   // this network; kOutOfMemory.
-  static Result<std::unique_ptr<FixedPointRunner>> create(const Network& network,
-                                                          const FixedPointNetwork& fixed,
-                                                          const FixedPointUse& use,
-                                                          ThreadPool& pool);
+  static Result<std::unique_ptr<FixedPointRunner>> create(
+      const Network& network, const FixedPointNetwork& fixed, const FixedPointUse& use,
+      ThreadPool& pool, const KernelTable& kernels = best_kernels());
   FixedPointRunner(const FixedPointRunner&) = delete;
   FixedPointRunner& operator=(const FixedPointRunner&) = delete;
 
@@ -53,7 +53,11 @@ class FixedPointRunner {
     return output_.span(wanted_.size() * head_.outputs());
   }  // [wanted,channels]
 
+  // Evaluates all wanted texels, or the groups of them that are named: of kWantedGroup each, in the
+  // order of FixedPointUse::wanted. The other outputs keep what they have.
+  static constexpr uint32_t kWantedGroup = 16;
   Status run();
+  Status run(std::span<const uint32_t> groups);
 
   uint64_t macs() const { return macs_; }
   uint64_t memory_bytes() const;  // XNNPACK's share is estimated
@@ -69,7 +73,7 @@ class FixedPointRunner {
     Buffer<int8_t> output;   // [T,T,outputs]
   };
 
-  explicit FixedPointRunner(ThreadPool& pool) : pool_(pool) {}
+  FixedPointRunner(ThreadPool& pool, const KernelTable& kernels) : pool_(pool), kernels_(kernels) {}
   Status prepare(const Network& network, const FixedPointNetwork& fixed, const FixedPointUse& use,
                  const std::vector<ValueShape>& shapes);
   Status prepare_first(const Network& network, const FixedPointNetwork& fixed,
@@ -83,9 +87,10 @@ class FixedPointRunner {
   void quantise_row(uint32_t y);
   enum class Texels : uint8_t { kOthers, kActive };
   void run_first(FirstConvolution& first, Texels texels, uint32_t y);
-  void run_head(size_t chunk);
+  void run_head(std::span<const uint32_t> groups, size_t task);
 
   ThreadPool& pool_;
+  const KernelTable& kernels_;
   uint32_t size_ = 0;  // T
   size_t input_count_ = 0;
   float input_scale_ = 1;
@@ -101,6 +106,7 @@ class FixedPointRunner {
   uint32_t head_size_ = 0;
   Buffer<float> head_scale_;  // [outputs]
   std::span<const uint32_t> wanted_;
+  Buffer<uint32_t> all_groups_;  // 0, 1, 2, ...
   Buffer<float> output_;
   // One line each for every task of a loop.
   size_t patch_stride_ = 0, sums_stride_ = 0;

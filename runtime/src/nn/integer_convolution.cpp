@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "runtime/src/base/integer_dot.h"
-
 namespace figurine {
 
 bool PaddedMap::ensure(uint32_t size, uint32_t channels) {
@@ -13,9 +11,9 @@ bool PaddedMap::ensure(uint32_t size, uint32_t channels) {
   return values_.ensure(size_t(size + 2) * (size + 2) * stride_);
 }
 
-bool IntegerConvolution::prepare(const Layer& layer, const FixedPointConvolution& convolution,
-                                 const ValueShape& input, uint32_t varying,
-                                 std::span<const int16_t> constants) {
+bool IntegerConvolution::prepare(const KernelTable& kernels, const Layer& layer,
+                                 const FixedPointConvolution& convolution, const ValueShape& input,
+                                 uint32_t varying, std::span<const int16_t> constants) {
   size_ = input.size;
   kernel_ = layer.kernel;
   varying_ = varying;
@@ -23,21 +21,23 @@ bool IntegerConvolution::prepare(const Layer& layer, const FixedPointConvolution
   stride_ = PaddedMap::stride_of(varying);
   const size_t taps = size_t{kernel_} * kernel_;
   length_ = taps * stride_;
-  padded_outputs_ = (outputs_ + kDotsAtOnce - 1) / kDotsAtOnce * kDotsAtOnce;
+  padded_outputs_ =
+      (outputs_ + kernels::kDotsAtOnce - 1) / kernels::kDotsAtOnce * kernels::kDotsAtOnce;
   if (!weights_.ensure(padded_outputs_ * length_)) return false;
   for (size_t row = 0; row < outputs_ * taps; ++row) {
     std::copy_n(convolution.weights.data() + row * input.channels, varying,
                 weights_.data() + row * stride_);
   }
   one_bias_ = varying == input.channels;
-  if (!one_bias_) return fold(layer, convolution, input.channels, constants);
+  if (!one_bias_) return fold(kernels, layer, convolution, input.channels, constants);
   if (!bias_.ensure(padded_outputs_)) return false;
   std::copy(convolution.bias.begin(), convolution.bias.end(), bias_.data());
   return true;
 }
 
-bool IntegerConvolution::fold(const Layer& layer, const FixedPointConvolution& convolution,
-                              uint32_t in_channels, std::span<const int16_t> constants) {
+bool IntegerConvolution::fold(const KernelTable& kernels, const Layer& layer,
+                              const FixedPointConvolution& convolution, uint32_t in_channels,
+                              std::span<const int16_t> constants) {
   const uint32_t count = in_channels - varying_;
   const size_t texels = size_t{size_} * size_, taps = size_t{kernel_} * kernel_;
   if (!bias_.ensure(texels * padded_outputs_)) return false;
@@ -52,7 +52,8 @@ bool IntegerConvolution::fold(const Layer& layer, const FixedPointConvolution& c
   }
   const FixedPointConvolution of_constants{
       .weights = weights, .weight_scale = convolution.weight_scale, .bias = convolution.bias};
-  if (!map.ensure(size_, count) || !rest.prepare(layer, of_constants, {size_, count}, count, {}))
+  if (!map.ensure(size_, count) ||
+      !rest.prepare(kernels, layer, of_constants, {size_, count}, count, {}))
     return false;
   for (uint32_t y = 0; y < size_; ++y) {
     for (uint32_t x = 0; x < size_; ++x) {
@@ -65,7 +66,7 @@ bool IntegerConvolution::fold(const Layer& layer, const FixedPointConvolution& c
   for (uint32_t y = 0; y < size_; ++y) {
     for (uint32_t x = 0; x < size_; ++x) {
       rest.gather(map, x, y, patch.data());
-      rest.sum(patch.data(), x, y, &bias_[(size_t{y} * size_ + x) * padded_outputs_]);
+      rest.sum(kernels, patch.data(), x, y, &bias_[(size_t{y} * size_ + x) * padded_outputs_]);
     }
   }
   return true;
@@ -78,8 +79,8 @@ void IntegerConvolution::gather(const PaddedMap& map, uint32_t x, uint32_t y,
   for (int32_t ky = -reach; ky <= reach; ++ky) {
     const int16_t* from = map.row(static_cast<int32_t>(y) + ky) +
                           (ptrdiff_t{x} - reach) * static_cast<ptrdiff_t>(stride_);
-    for (size_t k = 0; k < row_length; k += kDotMultiple)
-      std::copy_n(from + k, kDotMultiple, patch + k);
+    for (size_t k = 0; k < row_length; k += kernels::kDotMultiple)
+      std::copy_n(from + k, kernels::kDotMultiple, patch + k);
     patch += row_length;
   }
 }
@@ -101,11 +102,15 @@ void IntegerConvolution::gather(const int8_t* map, int32_t zero_point, uint32_t 
   }
 }
 
-void IntegerConvolution::sum(const int16_t* patch, uint32_t x, uint32_t y, int32_t* sums) const {
+void IntegerConvolution::sum(const KernelTable& kernels, const int16_t* patch, uint32_t x,
+                             uint32_t y, int32_t* sums) const {
   const int32_t* bias = bias_.data() + (one_bias_ ? 0 : (size_t{y} * size_ + x) * padded_outputs_);
   std::copy_n(bias, padded_outputs_, sums);
-  for (size_t o = 0; o < padded_outputs_; o += kDotsAtOnce)
-    add_four_dots(patch, weights_.data() + o * length_, length_, sums + o);
+  kernels.add_dots({.shared = patch,
+                    .rows = weights_.data(),
+                    .length = length_,
+                    .count = padded_outputs_,
+                    .sums = sums});
 }
 
 }  // namespace figurine

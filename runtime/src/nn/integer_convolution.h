@@ -16,6 +16,7 @@
 #include "figurine/fixed_point.h"
 #include "figurine/network.h"
 #include "runtime/src/base/memory.h"
+#include "runtime/src/kernels/table.h"
 
 namespace figurine {
 
@@ -44,8 +45,9 @@ class IntegerConvolution {
   // The layer reads maps of size x size texels of in_channels channels, of which the first
   // `varying` are given to every evaluation and the others, constants, once: [size,size,in_channels
   // - varying]. What these add is folded into a map of biases. False without memory.
-  bool prepare(const Layer& layer, const FixedPointConvolution& convolution,
-               const ValueShape& input, uint32_t varying, std::span<const int16_t> constants);
+  bool prepare(const KernelTable& kernels, const Layer& layer,
+               const FixedPointConvolution& convolution, const ValueShape& input, uint32_t varying,
+               std::span<const int16_t> constants);
 
   uint32_t outputs() const { return outputs_; }
   size_t patch_length() const {
@@ -62,12 +64,14 @@ class IntegerConvolution {
               int16_t* patch) const;  // [size,size,in_channels]
 
   // All outputs' sums at (x, y), bias and constants included.
-  void sum(const int16_t* patch, uint32_t x, uint32_t y, int32_t* sums) const;
+  void sum(const KernelTable& kernels, const int16_t* patch, uint32_t x, uint32_t y,
+           int32_t* sums) const;
 
   uint64_t memory_bytes() const { return weights_.memory_bytes() + bias_.memory_bytes(); }
 
  private:
-  bool fold(const Layer& layer, const FixedPointConvolution& convolution, uint32_t in_channels,
+  bool fold(const KernelTable& kernels, const Layer& layer,
+            const FixedPointConvolution& convolution, uint32_t in_channels,
             std::span<const int16_t> constants);
 
   uint32_t size_ = 0, kernel_ = 0, varying_ = 0, outputs_ = 0;

@@ -48,8 +48,9 @@ void softmax(float* x, size_t count) {
 
 }  // namespace
 
-DeviceTransformer::DeviceTransformer(const Sampler& sampler)
+DeviceTransformer::DeviceTransformer(const Sampler& sampler, const KernelTable& kernels)
     : sampler_(&sampler),
+      kernels_(kernels),
       tokens_(sampler.ranks.size() + 1),
       width_(sampler.denoiser.d_model),
       padded_tokens_((tokens_ + 7) / 8 * 8) {
@@ -75,15 +76,18 @@ bool DeviceTransformer::allocate() {
   size_t columns = std::max(width_, feed_forward);
   for (const uint32_t rank : sampler_->ranks) columns = std::max<size_t>(columns, rank);
   return rounded_.ensure(tokens_, columns) &&
-         row_.ensure((columns + kDotMultiple - 1) / kDotMultiple * kDotMultiple) &&
+         row_.ensure((columns + kernels::kDotMultiple - 1) / kernels::kDotMultiple *
+                     kernels::kDotMultiple) &&
          token_.ensure(tokens_ * width_) && normed_.ensure(tokens_ * width_) &&
          projected_.ensure(tokens_ * std::max(3 * width_, columns)) &&
          attended_.ensure(tokens_ * width_) && difference_.ensure(tokens_ * width_) &&
          keys_.ensure(head * padded_tokens_) && scores_.ensure(padded_tokens_);
 }
 
-Result<std::unique_ptr<DeviceTransformer>> DeviceTransformer::create(const Sampler& sampler) {
-  std::unique_ptr<DeviceTransformer> transformer(new (std::nothrow) DeviceTransformer(sampler));
+Result<std::unique_ptr<DeviceTransformer>> DeviceTransformer::create(const Sampler& sampler,
+                                                                     const KernelTable& kernels) {
+  std::unique_ptr<DeviceTransformer> transformer(new (std::nothrow)
+                                                     DeviceTransformer(sampler, kernels));
   if (transformer == nullptr || !transformer->allocate())
     return out_of_memory("the sampler's transformer");
   return transformer;
@@ -98,7 +102,7 @@ uint64_t DeviceTransformer::memory_bytes() const {
 void DeviceTransformer::multiply(const IntegerMatrix& matrix, const float* x, size_t rows,
                                  size_t x_stride, float* y, size_t y_stride) {
   rounded_.round(x, rows, matrix.columns(), x_stride);
-  figurine::multiply(matrix, rounded_, row_.span(rounded_.length()), y, y_stride);
+  figurine::multiply(kernels_, matrix, rounded_, row_.span(rounded_.length()), y, y_stride);
 }
 
 // The time token: sines, then cosines, through two layers.

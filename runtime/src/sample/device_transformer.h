@@ -25,7 +25,8 @@ namespace figurine {
 class DeviceTransformer {
  public:
   // Borrows from the sampler's package, which must outlive it. kOutOfMemory.
-  static Result<std::unique_ptr<DeviceTransformer>> create(const Sampler& sampler);
+  static Result<std::unique_ptr<DeviceTransformer>> create(
+      const Sampler& sampler, const KernelTable& kernels = best_kernels());
 
   // z, x0: [D]. lambda: finite. Allocates nothing.
   void predict(std::span<const float> z, double lambda, std::span<float> x0);
@@ -33,7 +34,7 @@ class DeviceTransformer {
   uint64_t memory_bytes() const;
 
  private:
-  explicit DeviceTransformer(const Sampler& sampler);
+  DeviceTransformer(const Sampler& sampler, const KernelTable& kernels);
   bool allocate();
   void multiply(const IntegerMatrix& matrix, const float* x, size_t rows, size_t x_stride, float* y,
                 size_t y_stride);
@@ -42,6 +43,7 @@ class DeviceTransformer {
   void attend();
 
   const Sampler* sampler_;
+  const KernelTable& kernels_;
   std::vector<IntegerMatrix> matrices_;  // in the order of denoiser_matrices
   std::vector<double> frequency_;        // [d / 2] turns a unit of lambda
   size_t tokens_ = 0;                    // L + 1, time first

@@ -13,8 +13,8 @@
 #include <cstdint>
 #include <span>
 
-#include "runtime/src/base/integer_dot.h"
 #include "runtime/src/base/memory.h"
+#include "runtime/src/kernels/table.h"
 
 namespace figurine {
 
@@ -35,14 +35,14 @@ class RoundedRows {
   size_t columns() const { return columns_; }
   size_t length() const {
     return length_;
-  }  // between rows; a multiple of kDotMultiple, zero behind the columns
+  }  // between rows; a multiple of kernels::kDotMultiple, zero behind the columns
   const int16_t* row(size_t i) const { return values_.data() + i * length_; }
   float scale(size_t i) const { return scale_[i]; }
   uint64_t memory_bytes() const { return values_.memory_bytes() + scale_.memory_bytes(); }
 
  private:
   size_t rows_ = 0, columns_ = 0, length_ = 0;
-  Buffer<int16_t> values_;  // rows rounded up to a multiple of kDotsAtOnce
+  Buffer<int16_t> values_;  // rows rounded up to a multiple of kernels::kDotsAtOnce
   Buffer<float> scale_;
 };
 
@@ -57,7 +57,7 @@ struct IntegerMatrix {
 
 // y: [x.rows(),matrix.rows()], rows y_stride apart. x.columns() must be matrix.columns(). row: of
 // x.length() values.
-void multiply(const IntegerMatrix& matrix, const RoundedRows& x, std::span<int16_t> row, float* y,
-              size_t y_stride);
+void multiply(const KernelTable& kernels, const IntegerMatrix& matrix, const RoundedRows& x,
+              std::span<int16_t> row, float* y, size_t y_stride);
 
 }  // namespace figurine

@@ -1,169 +1,153 @@
 #include "runtime/src/splat/rasterizer.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <cstring>
 
 #include "runtime/src/splat/resolve.h"
 
 namespace figurine {
+
 namespace {
 
-constexpr uint32_t kChunk = 256;  // Gaussians that one task projects
-constexpr int32_t kTile = kernels::kTileSize;
-// A Gaussian of a person touches 1 to 4 tiles at usual sizes. The list holds at least one pair per
-// Gaussian, so every single tile fits.
-constexpr size_t kPairsPerGaussian = 4, kMinPairs = 65536;
+// Two stages share a loop, so that what the first made is still in the cache for the second: the
+// loop's time is divided as its tasks' times are.
+void divide_time(uint64_t elapsed_ns, Stage first, uint64_t first_ns, Stage second,
+                 uint64_t second_ns, StageClock& clock) {
+  const uint64_t sum_ns = first_ns + second_ns;
+  const double share = sum_ns == 0 ? 1 : double(first_ns) / double(sum_ns);
+  const uint64_t part_ns = static_cast<uint64_t>(share * double(elapsed_ns));
+  clock.add(first, part_ns);
+  clock.add(second, elapsed_ns - part_ns);
+}
 
 }  // namespace
 
-Status Rasterizer::begin(const Camera& camera, float alpha_cut, uint32_t gaussian_count) {
-  view_ = make_view_parameters(camera, alpha_cut);
-  tiles_x_ = (camera.width_px + kTile - 1) / kTile;
-  tiles_y_ = (camera.height_px + kTile - 1) / kTile;
-  added_ = visible_ = 0;
-  pairs_ = blends_ = 0;
-  sorted_ = nullptr;
-  const size_t tiles = size_t(tiles_x_) * tiles_y_;
-  pair_capacity_ = std::max(kMinPairs, kPairsPerGaussian * size_t(gaussian_count));
-  const bool fits = splats_.ensure(gaussian_count) && boxes_.ensure(gaussian_count) &&
-                    chunk_visible_.ensure(gaussian_count / kChunk + 1) &&
-                    depth_sort_.ensure(gaussian_count) && pair_splat_.ensure(pair_capacity_) &&
-                    tile_count_.ensure(tiles) && tile_begin_.ensure(tiles) &&
-                    tile_cursor_.ensure(tiles) && tile_result_.ensure(tiles);
+Status Rasterizer::begin(const kernels::View& view, const LeaveOut& leave_out, uint32_t blocks) {
+  view_ = view;
+  leave_out_ = leave_out;
+  slots_ = visible_ = 0;
+  gaussians_ = transparent_ = outside_ = 0;
+  blends_ = stopped_ = 0;
+  const size_t slots = size_t{blocks} * kernels::kLanes;
+  const bool fits = splats_.ensure(slots) && task_result_.ensure(blocks / kBlocksPerTask + 1) &&
+                    depth_sort_.ensure(slots) &&
+                    bins_.prepare(view.width_px, view.height_px, slots) &&
+                    tile_result_.ensure(bins_.tiles());
   return fits ? Status() : out_of_memory("the frame's Gaussians and tiles");
 }
 
-uint32_t Rasterizer::project_chunk(const GaussianView& gaussians, uint32_t begin, uint32_t end,
-                                   uint32_t first_slot) {
-  DepthSort::Item* out = depth_sort_.items() + first_slot + begin;
-  uint32_t visible = 0;
-  for (uint32_t i = begin; i < end; ++i) {
-    const uint32_t slot = first_slot + i;
-    float depth_m;
-    if (!project_gaussian(view_, gaussians, i, splats_[slot], boxes_[slot], depth_m)) continue;
-    out[visible++] = {.depth_bits = std::bit_cast<uint32_t>(depth_m), .index = slot};
+// Projects a block into its slots; the visible ones' keys follow those that the task already has.
+void Rasterizer::project(const kernels::GaussianBlock& block, uint32_t lanes, uint32_t sh_degree,
+                         uint32_t first_slot, DepthSort::Item* items, TaskResult& result) {
+  float depth_m[kernels::kLanes];
+  const uint32_t leave_out = (leave_out_.transparent ? kernels::kLeaveOutTransparent : 0u) |
+                             (leave_out_.outside ? kernels::kLeaveOutOutside : 0u);
+  const kernels::ProjectedLanes projected =
+      kernels_.project_block({.view = &view_,
+                              .gaussians = &block,
+                              .count = lanes,
+                              .sh_degree = sh_degree,
+                              .leave_out = leave_out,
+                              .splats = splats_.data() + first_slot,
+                              .depth_m = depth_m});
+  result.gaussians += lanes;
+  result.transparent += static_cast<uint32_t>(std::popcount(projected.transparent));
+  result.outside += static_cast<uint32_t>(std::popcount(projected.outside));
+  for (uint32_t left = projected.visible; left != 0; left &= left - 1) {
+    const uint32_t lane = static_cast<uint32_t>(std::countr_zero(left));
+    items[result.visible++] = {.depth_bits = std::bit_cast<uint32_t>(depth_m[lane]),
+                               .index = first_slot + lane};
   }
-  return visible;
+}
+
+void Rasterizer::finish_add(uint32_t blocks, Stage fill_stage, uint64_t elapsed_ns,
+                            StageClock& clock) {
+  // Tasks left gaps; closing them in order keeps the input order, which breaks ties of depth.
+  DepthSort::Item* const items = depth_sort_.items();
+  uint64_t fill_ns = 0, project_ns = 0;
+  for (uint32_t task = 0; task < (blocks + kBlocksPerTask - 1) / kBlocksPerTask; ++task) {
+    const TaskResult& result = task_result_[task];
+    std::memmove(items + visible_, items + slots_ + task * kBlocksPerTask * kernels::kLanes,
+                 result.visible * sizeof(DepthSort::Item));
+    visible_ += result.visible;
+    gaussians_ += result.gaussians;
+    transparent_ += result.transparent;
+    outside_ += result.outside;
+    fill_ns += result.fill_ns;
+    project_ns += result.project_ns;
+  }
+  slots_ += blocks * kernels::kLanes;
+  divide_time(elapsed_ns, fill_stage, fill_ns, Stage::kProject, project_ns, clock);
 }
 
 void Rasterizer::add(const GaussianView& gaussians, StageClock& clock) {
-  const StageClock::Scope timed(clock, Stage::kProject);
-  const uint32_t first_slot = added_, chunks = (gaussians.count + kChunk - 1) / kChunk;
-  pool_.for_each(chunks, [&](size_t chunk) {
-    const uint32_t begin = static_cast<uint32_t>(chunk) * kChunk,
-                   end = std::min(begin + kChunk, gaussians.count);
-    chunk_visible_[chunk] = project_chunk(gaussians, begin, end, first_slot);
-  });
-  // Chunks left gaps; closing them in order keeps the input order, which breaks ties of depth.
-  DepthSort::Item* items = depth_sort_.items();
-  for (uint32_t chunk = 0; chunk < chunks; ++chunk) {
-    std::memmove(items + visible_, items + first_slot + chunk * kChunk,
-                 chunk_visible_[chunk] * sizeof(DepthSort::Item));
-    visible_ += chunk_visible_[chunk];
-  }
-  added_ += gaussians.count;
-}
-
-// visit(tile) for every tile that the splat's ellipse may touch. Exact per row of tiles: the
-// ellipse is widest within the row at its widest point clamped to the row, because its extent is
-// concave in y.
-template <class Visit>
-void Rasterizer::for_each_tile(uint32_t slot, const Visit& visit) const {
-  const SplatBox box = boxes_[slot];
-  if (box.tile_x_begin == box.tile_x_last) {
-    for (uint32_t y = box.tile_y_begin; y <= box.tile_y_last; ++y)
-      visit(y * tiles_x_ + box.tile_x_begin);
-    return;
-  }
-  const kernels::Splat& splat = splats_[slot];
-  constexpr float kSlackPx = 0.01f, kSlackRatio = 1.0001f;
-  for (uint32_t y = box.tile_y_begin; y <= box.tile_y_last; ++y) {
-    const float top = (static_cast<float>(y * kTile) + 0.5f) - splat.mean_y,
-                bottom = top + static_cast<float>(kTile - 1);
-    const auto half_width = [&](float dy) {
-      const float v = dy * splat.scale_v, room = splat.reach - v * v;
-      return room > 0 ? std::sqrt(room) * splat.inverse_scale_u * kSlackRatio + kSlackPx : kSlackPx;
-    };
-    const float dy_right = std::min(std::max(box.widest_dy_px, top), bottom),
-                dy_left = std::min(std::max(-box.widest_dy_px, top), bottom);
-    const float right = splat.mean_x + splat.slope * dy_right + half_width(dy_right);
-    const float left = splat.mean_x + splat.slope * dy_left - half_width(dy_left);
-    // Written so that anything not comparable falls back to the box.
-    uint32_t first = box.tile_x_begin, last = box.tile_x_last;
-    if (left >= static_cast<float>((first + 1) * kTile))
-      first = left < static_cast<float>(last * kTile) ? static_cast<uint32_t>(left) / kTile : last;
-    if (right < static_cast<float>(last * kTile))
-      last =
-          right > static_cast<float>(first * kTile) ? static_cast<uint32_t>(right) / kTile : first;
-    for (uint32_t x = first; x <= last; ++x) visit(y * tiles_x_ + x);
-  }
-}
-
-void Rasterizer::count_pairs() {
-  std::memset(tile_count_.data(), 0, size_t(tiles_x_) * tiles_y_ * sizeof(uint32_t));
-  for (uint32_t i = 0; i < visible_; ++i)
-    for_each_tile(sorted_[i].index, [&](uint32_t tile) { ++tile_count_[tile]; });
-  for (uint32_t tile = 0; tile < tiles_x_ * tiles_y_; ++tile) pairs_ += tile_count_[tile];
-}
-
-void Rasterizer::fill_pairs(const TileRange& band) {
-  uint32_t sum = 0;
-  for (uint32_t tile = band.begin; tile < band.end; ++tile) {
-    tile_begin_[tile] = tile_cursor_[tile] = sum;
-    sum += tile_count_[tile];
-  }
-  for (uint32_t i = 0; i < visible_; ++i) {
-    const uint32_t slot = sorted_[i].index;
-    for_each_tile(slot, [&](uint32_t tile) {
-      if (tile >= band.begin && tile < band.end) pair_splat_[tile_cursor_[tile]++] = slot;
-    });
-  }
+  add(block_count(gaussians.count), gaussians.sh_degree, Stage::kProject, clock,
+      [&](uint32_t block, kernels::GaussianBlock& out) {
+        return load_block(gaussians, block, out);
+      });
 }
 
 void Rasterizer::blend_tile(uint32_t index, const ImageTarget& target,
                             const std::optional<std::array<float, 3>>& background,
                             StageClock& clock) {
+  constexpr int32_t kTile = kernels::kTileSize;
+  const int32_t x = static_cast<int32_t>(index % bins_.tiles_x()) * kTile,
+                y = static_cast<int32_t>(index / bins_.tiles_x()) * kTile;
+  const TileArea area{.x = x,
+                      .y = y,
+                      .width = std::min(kTile, static_cast<int32_t>(view_.width_px) - x),
+                      .height = std::min(kTile, static_cast<int32_t>(view_.height_px) - y)};
+  const uint32_t count = bins_.count_of(index);
   kernels::TilePixels pixels;
-  const int32_t x = static_cast<int32_t>(index % tiles_x_) * kTile,
-                y = static_cast<int32_t>(index / tiles_x_) * kTile;
-  const kernels::Tile tile{.splats = splats_.data(),
-                           .order = pair_splat_.data() + tile_begin_[index],
-                           .count = tile_count_[index],
-                           .x = x,
-                           .y = y,
-                           .width = std::min(kTile, static_cast<int32_t>(view_.width_px) - x),
-                           .height = std::min(kTile, static_cast<int32_t>(view_.height_px) - y),
-                           .alpha_cut = view_.alpha_cut,
-                           .pixels = &pixels};
+  kernels::BlendedTile blended{};
   const uint64_t begin_ns = clock.now();
-  const uint64_t blends = tile.count == 0 ? 0 : kernels::blend_tile_scalar(tile);
+  if (count != 0) {
+    blended = kernels_.blend_tile({.splats = splats_.data(),
+                                   .order = bins_.order(index),
+                                   .count = count,
+                                   .x = area.x,
+                                   .y = area.y,
+                                   .width = area.width,
+                                   .height = area.height,
+                                   .alpha_cut = view_.alpha_cut,
+                                   .leave_out_stopped = leave_out_.stopped ? 1u : 0u,
+                                   .pixels = &pixels});
+  }
   const uint64_t blended_ns = clock.now();
-  resolve_tile(tile, background, target);
-  tile_result_[index] = {
-      .blends = blends, .blend_ns = blended_ns - begin_ns, .resolve_ns = clock.now() - blended_ns};
+  resolve_tile(kernels_, area, count == 0 ? nullptr : &pixels, background, target);
+  tile_result_[index] = {.blends = blended.contributions,
+                         .stopped = count - blended.splats,
+                         .blend_ns = blended_ns - begin_ns,
+                         .resolve_ns = clock.now() - blended_ns};
+}
+
+void Rasterizer::finish_band(const TileBins::Band& band, uint64_t elapsed_ns, StageClock& clock) {
+  uint64_t blend_ns = 0, resolve_ns = 0;
+  for (uint32_t tile = band.begin; tile < band.end; ++tile) {
+    blends_ += tile_result_[tile].blends;
+    stopped_ += tile_result_[tile].stopped;
+    blend_ns += tile_result_[tile].blend_ns;
+    resolve_ns += tile_result_[tile].resolve_ns;
+  }
+  divide_time(elapsed_ns, Stage::kBlend, blend_ns, Stage::kResolve, resolve_ns, clock);
 }
 
 void Rasterizer::draw(const ImageTarget& target,
                       const std::optional<std::array<float, 3>>& background, StageClock& clock) {
+  const DepthSort::Item* sorted = nullptr;
   {
     const StageClock::Scope timed(clock, Stage::kSort);
-    sorted_ = depth_sort_.sort(visible_);
+    sorted = depth_sort_.sort(visible_);
   }
   {
     const StageClock::Scope timed(clock, Stage::kBin);
-    count_pairs();
+    bins_.count(splats_.data(), sorted, visible_, leave_out_.missed_tiles);
   }
-  const uint32_t tiles = tiles_x_ * tiles_y_;
-  for (TileRange band{0, 0}; band.begin < tiles; band.begin = band.end) {
-    size_t band_pairs = 0;
-    for (band.end = band.begin;
-         band.end < tiles && band_pairs + tile_count_[band.end] <= pair_capacity_; ++band.end)
-      band_pairs += tile_count_[band.end];
+  const uint32_t tiles = bins_.tiles();
+  for (TileBins::Band band{0, 0}; band.end < tiles;) {
     {
       const StageClock::Scope timed(clock, Stage::kBin);
-      fill_pairs(band);
+      band = bins_.fill_band(band.end);
     }
     const uint64_t begin_ns = clock.now();
     pool_.for_each(
@@ -172,27 +156,24 @@ void Rasterizer::draw(const ImageTarget& target,
           blend_tile(band.begin + static_cast<uint32_t>(i), target, background, clock);
         },
         band.end == tiles ? ThreadPool::Afterwards::kSleep : ThreadPool::Afterwards::kSpin);
-    // Blend and resolve share a loop, so that a tile is still in the cache: the loop's time is
-    // divided as its tasks' times are.
-    const uint64_t elapsed_ns = clock.now() - begin_ns;
-    uint64_t blend_ns = 0, resolve_ns = 0;
-    for (uint32_t tile = band.begin; tile < band.end; ++tile) {
-      blends_ += tile_result_[tile].blends;
-      blend_ns += tile_result_[tile].blend_ns;
-      resolve_ns += tile_result_[tile].resolve_ns;
-    }
-    const double share =
-        blend_ns + resolve_ns == 0 ? 1 : double(blend_ns) / double(blend_ns + resolve_ns);
-    const uint64_t blend_part_ns = static_cast<uint64_t>(share * double(elapsed_ns));
-    clock.add(Stage::kBlend, blend_part_ns);
-    clock.add(Stage::kResolve, elapsed_ns - blend_part_ns);
+    finish_band(band, clock.now() - begin_ns, clock);
   }
 }
 
+void Rasterizer::report(FrameStatistics& statistics) const {
+  statistics.gaussians = gaussians_;
+  statistics.visible = visible_;
+  statistics.pairs = bins_.pair_count();
+  statistics.blends = blends_;
+  statistics.left_out.transparent = transparent_;
+  statistics.left_out.outside = outside_;
+  statistics.left_out.missed_tiles = bins_.missed_pairs();
+  statistics.left_out.stopped = stopped_;
+}
+
 uint64_t Rasterizer::memory_bytes() const {
-  return splats_.memory_bytes() + boxes_.memory_bytes() + chunk_visible_.memory_bytes() +
-         depth_sort_.memory_bytes() + pair_splat_.memory_bytes() + tile_count_.memory_bytes() +
-         tile_begin_.memory_bytes() + tile_cursor_.memory_bytes() + tile_result_.memory_bytes();
+  return splats_.memory_bytes() + task_result_.memory_bytes() + depth_sort_.memory_bytes() +
+         bins_.memory_bytes() + tile_result_.memory_bytes();
 }
 
 }  // namespace figurine

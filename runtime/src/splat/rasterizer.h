@@ -1,9 +1,7 @@
 // Any number of Gaussian sets into one image: project, sort by depth, bin into tiles, blend,
 // resolve.
 //
-// Memory is bounded by the number of Gaussians and tiles alone. The (splat, tile) pairs are not: a
-// frame whose pairs do not fit the list is drawn in bands of tiles, each of which does. So a frame
-// never allocates after begin(), and never fails after it.
+// A frame never allocates after begin(), and never fails after it.
 //
 // Based on: Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023
 // (tiles, front-to-back blending); here one global depth sort and a stable counting bin take the
@@ -11,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <optional>
 
@@ -20,70 +19,103 @@
 #include "runtime/src/base/memory.h"
 #include "runtime/src/base/stage_clock.h"
 #include "runtime/src/base/thread_pool.h"
+#include "runtime/src/kernels/table.h"
 #include "runtime/src/splat/depth_sort.h"
-#include "runtime/src/splat/kernels/blend.h"
-#include "runtime/src/splat/project.h"
+#include "runtime/src/splat/gaussian_blocks.h"
+#include "runtime/src/splat/tile_bins.h"
 
 namespace figurine {
 
 class Rasterizer {
  public:
-  explicit Rasterizer(ThreadPool& pool) : pool_(pool) {}
+  Rasterizer(ThreadPool& pool, const KernelTable& kernels)
+      : pool_(pool), kernels_(kernels), depth_sort_(pool), bins_(pool) {}
 
-  // Starts a frame of at most gaussian_count Gaussians. The camera must be valid, alpha_cut in (0,
-  // 0.5]. Error: kOutOfMemory.
-  Status begin(const Camera& camera, float alpha_cut, uint32_t gaussian_count);
+  // Starts a frame of at most so many blocks of Gaussians. The view is make_view's. Error:
+  // kOutOfMemory.
+  Status begin(const kernels::View& view, const LeaveOut& leave_out, uint32_t blocks);
 
-  // Projects a set behind those already added. Sets count in the order they are added where depths
-  // are equal. The set is not needed afterwards.
+  // Projects a set of Gaussians behind those already added, block by block on all threads:
+  // fill(i, block) fills block i and returns how many lanes hold a Gaussian. Its time counts for
+  // `fill_stage`. Sets count in the order they are added where depths are equal.
+  template <class Fill>
+  void add(uint32_t blocks, uint32_t sh_degree, Stage fill_stage, StageClock& clock,
+           const Fill& fill);
   void add(const GaussianView& gaussians, StageClock& clock);
 
-  // Sorts, bins, blends and writes every pixel of the target, which must be valid for the camera.
+  // Sorts, bins, blends and writes every pixel of the target, which must be valid for the view.
   void draw(const ImageTarget& target, const std::optional<std::array<float, 3>>& background,
             StageClock& clock);
 
-  uint64_t gaussians() const { return added_; }
-  uint64_t visible() const { return visible_; }
-  uint64_t pairs() const { return pairs_; }
-  uint64_t blends() const { return blends_; }
+  // Fills what the frame's Gaussians came to; times and the rest stay as they are.
+  void report(FrameStatistics& statistics) const;
   uint64_t memory_bytes() const;
 
  private:
-  struct TileRange {
-    uint32_t begin, end;
+  // Blocks of a task, and those of them that are filled before they are projected: few enough to
+  // stay in the cache, many enough that two looks at the clock do not show.
+  static constexpr uint32_t kBlocksPerTask = 16, kBlocksPerGroup = 4;
+
+  struct TaskResult {
+    uint32_t gaussians, visible, transparent, outside;
+    uint64_t fill_ns, project_ns;
+  };
+  struct TileResult {
+    uint64_t blends, stopped;
+    uint64_t blend_ns, resolve_ns;
   };
 
-  uint32_t project_chunk(const GaussianView& gaussians, uint32_t begin, uint32_t end,
-                         uint32_t first_slot);
-  void count_pairs();
-  void fill_pairs(const TileRange& band);
+  void project(const kernels::GaussianBlock& block, uint32_t lanes, uint32_t sh_degree,
+               uint32_t first_slot, DepthSort::Item* items, TaskResult& result);
+  void finish_add(uint32_t blocks, Stage fill_stage, uint64_t elapsed_ns, StageClock& clock);
   void blend_tile(uint32_t tile, const ImageTarget& target,
                   const std::optional<std::array<float, 3>>& background, StageClock& clock);
-  template <class Visit>
-  void for_each_tile(uint32_t slot, const Visit& visit) const;
+  void finish_band(const TileBins::Band& band, uint64_t elapsed_ns, StageClock& clock);
 
   ThreadPool& pool_;
-  ViewParameters view_{};
-  uint32_t tiles_x_ = 0, tiles_y_ = 0;
+  const KernelTable& kernels_;
+  kernels::View view_{};
+  LeaveOut leave_out_;
 
-  // One slot per Gaussian added, filled for the visible ones.
-  uint32_t added_ = 0, visible_ = 0;
+  // One slot per lane of every block added, filled for the visible ones.
+  uint32_t slots_ = 0, visible_ = 0;
+  uint64_t gaussians_ = 0, transparent_ = 0, outside_ = 0;
   Buffer<kernels::Splat> splats_;
-  Buffer<SplatBox> boxes_;
-  Buffer<uint32_t> chunk_visible_;  // of the set being added: visible ones of each chunk
+  Buffer<TaskResult> task_result_;  // of the set being added
   DepthSort depth_sort_;
-  const DepthSort::Item* sorted_ = nullptr;  // [visible_] front to back
 
-  uint64_t pairs_ = 0, blends_ = 0;
-  size_t pair_capacity_ = 0;
-  Buffer<uint32_t> pair_splat_;  // slots, tile by tile, front to back
-  Buffer<uint32_t> tile_count_;  // [tiles]
-  Buffer<uint32_t> tile_begin_;  // [tiles] into pair_splat_, within a band
-  Buffer<uint32_t> tile_cursor_;
-  struct TileResult {
-    uint64_t blends, blend_ns, resolve_ns;
-  };
+  TileBins bins_;
+  uint64_t blends_ = 0, stopped_ = 0;
   Buffer<TileResult> tile_result_;
 };
+
+template <class Fill>
+void Rasterizer::add(uint32_t blocks, uint32_t sh_degree, Stage fill_stage, StageClock& clock,
+                     const Fill& fill) {
+  const uint64_t begin_ns = clock.now();
+  const uint32_t first_slot = slots_;
+  pool_.for_each((blocks + kBlocksPerTask - 1) / kBlocksPerTask, [&](size_t task) {
+    const uint32_t begin = static_cast<uint32_t>(task) * kBlocksPerTask,
+                   end = std::min(begin + kBlocksPerTask, blocks);
+    DepthSort::Item* const items = depth_sort_.items() + first_slot + begin * kernels::kLanes;
+    TaskResult result{};
+    kernels::GaussianBlock group[kBlocksPerGroup];
+    uint32_t lanes[kBlocksPerGroup];
+    for (uint32_t first = begin; first < end; first += kBlocksPerGroup) {
+      const uint32_t count = std::min(kBlocksPerGroup, end - first);
+      const uint64_t started_ns = clock.now();
+      for (uint32_t i = 0; i < count; ++i) lanes[i] = fill(first + i, group[i]);
+      const uint64_t filled_ns = clock.now();
+      for (uint32_t i = 0; i < count; ++i) {
+        project(group[i], lanes[i], sh_degree, first_slot + (first + i) * kernels::kLanes, items,
+                result);
+      }
+      result.fill_ns += filled_ns - started_ns;
+      result.project_ns += clock.now() - filled_ns;
+    }
+    task_result_[task] = result;
+  });
+  finish_add(blocks, fill_stage, clock.now() - begin_ns, clock);
+}
 
 }  // namespace figurine

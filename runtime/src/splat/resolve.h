@@ -6,14 +6,20 @@
 #include <optional>
 
 #include "figurine/frame.h"
-#include "runtime/src/splat/kernels/blend.h"
+#include "runtime/src/kernels/table.h"
 
 namespace figurine {
 
-// Writes tile.width x tile.height pixels; the pixels of a tile without splats are not read. kRgba8
-// rounds to nearest and clamps, kRgbaF32 does neither. Where nothing was blended and there is no
-// background, all four channels are 0.
-void resolve_tile(const kernels::Tile& tile, const std::optional<std::array<float, 3>>& background,
-                  const ImageTarget& target);
+// A tile of the image: its first pixel and the pixels of it that are inside.
+struct TileArea {
+  int32_t x, y, width, height;
+};
+
+// Writes the tile's pixels. Null pixels: nothing was blended there. kRgba8 rounds to nearest and
+// clamps, kRgbaF32 does neither. Where nothing was blended and there is no background, all four
+// channels are 0.
+void resolve_tile(const KernelTable& kernels, const TileArea& area,
+                  const kernels::TilePixels* pixels,
+                  const std::optional<std::array<float, 3>>& background, const ImageTarget& target);
 
 }  // namespace figurine

@@ -1,4 +1,4 @@
-// The blend, in scalar code: the specification of every other kernel.
+// The blend, a pixel at a time: the specification of every other kernel.
 //
 // Per splat the exact span of its ellipse in every row, then per pixel alpha, the cut, the stop,
 // the sum. The span only skips pixels that the cut would reject anyway (reach has slack above
@@ -7,15 +7,13 @@
 // with the same bits (runtime/CMakeLists.txt lets it).
 //
 // Based on: Kerbl et al., 3D Gaussian Splatting for Real-Time Radiance Field Rendering, 2023, eq. 3
-// (front-to-back alpha blending) and its rasterizer's constants in figurine/gaussian.h.
-#include <cmath>
-
-#include "figurine/gaussian.h"
-#include "runtime/src/base/float_math.h"
-#include "runtime/src/splat/kernels/blend.h"
+// (front-to-back alpha blending) and its rasterizer's constants (figurine/gaussian.h).
+#include "runtime/src/kernels/kernel.h"
 
 namespace figurine::kernels {
 namespace {
+
+#include "runtime/src/kernels/kernel_math.inc"
 
 constexpr int32_t kBlock = 4;  // spans are widened to multiples of it
 static_assert(kTileSize % kBlock == 0);
@@ -43,7 +41,7 @@ void find_spans(const Splat& splat, const float* __restrict row_y, float middle_
     const float dy = row_y[y] - splat.mean_y;
     const float v = dy * splat.scale_v, v2 = v * v;
     const float room = splat.reach - v2;
-    const float half_width = std::sqrt(room > 0 ? room : 0.0f) * splat.inverse_scale_u;
+    const float half_width = __builtin_sqrtf(room > 0 ? room : 0.0f) * splat.inverse_scale_u;
     const float centre = splat.mean_x + splat.slope * dy, middle = centre - middle_left;
     // A pixel centre exactly on a bound is beyond reach, so it may count as inside or outside.
     const int32_t begin = static_cast<int32_t>(clamp(middle - half_width + 1, 0, width)) & -kBlock;
@@ -98,9 +96,9 @@ bool all_stopped(const TilePixels& pixels) {
   return living == 0;
 }
 
-void clear(const Tile& tile) {
-  for (float* plane : {tile.pixels->red, tile.pixels->green, tile.pixels->blue}) {
-    for (int32_t i = 0; i < kTilePixels; ++i) plane[i] = 0;
+void clear(const BlendTileJob& tile) {
+  for (int32_t i = 0; i < kTilePixels; ++i) {
+    tile.pixels->red[i] = tile.pixels->green[i] = tile.pixels->blue[i] = 0;
   }
   // Pixels outside the image are stopped from the start: blocks may touch them, counts may not.
   for (int32_t y = 0; y < kTileSize; ++y) {
@@ -113,7 +111,7 @@ void clear(const Tile& tile) {
 
 }  // namespace
 
-uint64_t blend_tile_scalar(const Tile& tile) {
+BlendedTile blend_tile_baseline(const BlendTileJob& tile) {
   clear(tile);
   TilePixels& pixels = *tile.pixels;
   const float left = static_cast<float>(tile.x), top = static_cast<float>(tile.y);
@@ -124,8 +122,12 @@ uint64_t blend_tile_scalar(const Tile& tile) {
   for (int32_t y = 0; y < kTileSize; ++y) row_y[y] = (top + static_cast<float>(y)) + 0.5f;
 
   uint64_t blended = 0;
-  for (uint32_t i = 0; i < tile.count; ++i) {
-    if (i % kSplatsPerCheck == kSplatsPerCheck - 1 && all_stopped(pixels)) break;
+  uint32_t i = 0;
+  for (; i < tile.count; ++i) {
+    if (tile.leave_out_stopped != 0 && i % kSplatsPerCheck == kSplatsPerCheck - 1 &&
+        all_stopped(pixels)) {
+      break;
+    }
     if (i + kPrefetch < tile.count) __builtin_prefetch(&tile.splats[tile.order[i + kPrefetch]]);
     const Splat splat = tile.splats[tile.order[i]];
     // Rows and columns relative to the tile, ends exclusive. A pixel centre exactly on a bound is
@@ -138,7 +140,7 @@ uint64_t blend_tile_scalar(const Tile& tile) {
     blended += blend_spans(splat, spans, y_begin, y_end, tile.alpha_cut, column_x, pixels.red,
                            pixels.green, pixels.blue, pixels.transmittance);
   }
-  return blended;
+  return {.contributions = blended, .splats = i};
 }
 
 }  // namespace figurine::kernels

@@ -1,0 +1,110 @@
+#include "runtime/src/pose/visibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "figurine/gaussian.h"
+#include "runtime/src/base/float_math.h"
+
+namespace figurine {
+namespace {
+
+// Bounds are widened by more than a thousand roundings.
+constexpr float kSlackRatio = 1.001f, kSlackPx = 0.05f;
+
+struct Interval {
+  float low, high;
+};
+
+// Of x / z for x and z > 0 in intervals.
+Interval divide(const Interval& x, const Interval& z) {
+  return {x.low < 0 ? x.low / z.low : x.low / z.high,
+          x.high > 0 ? x.high / z.low : x.high / z.high};
+}
+
+// Whether pixels centred between 0.5 and size - 0.5 may lie within reach of a mean in an interval.
+// Anything not comparable may.
+bool touches(const Interval& mean_px, float reach_px, uint32_t size_px) {
+  return !(mean_px.low - reach_px > static_cast<float>(size_px) - 0.5f) &&
+         !(mean_px.high + reach_px < 0.5f);
+}
+
+// A texel's Gaussian lies within `radius_m` of `centre` (world) and deviates by at most
+// deviation_m.
+bool sphere_may_be_seen(const float* centre, float radius_m, float deviation_m, float sigmas,
+                        const kernels::View& view) {
+  const float* m = view.view_from_world;
+  Interval seen[3];
+  for (int i = 0; i < 3; ++i) {
+    const float at = (m[4 * i] * centre[0] + m[4 * i + 1] * centre[1]) +
+                     (m[4 * i + 2] * centre[2] + m[4 * i + 3]);
+    seen[i] = {at - radius_m, at + radius_m};
+  }
+  if (seen[2].high <= view.near_m) return false;  // behind the near plane, wherever it is
+  if (!(seen[2].low > view.near_m)) return true;  // its projection has no bound
+  const Interval tan_x = divide(seen[0], seen[2]), tan_y = divide(seen[1], seen[2]);
+  // |u| <= f / z (1 + |tan|) deviation, where the tangent is clamped; a = |u|^2 + dilation.
+  const float steepest_x = std::max(std::fabs(view.tan_x_min), std::fabs(view.tan_x_max)),
+              steepest_y = std::max(std::fabs(view.tan_y_min), std::fabs(view.tan_y_max));
+  const float scale = deviation_m / seen[2].low;
+  const float dilation_px = std::sqrt(kDilationPx2);
+  const auto reach = [&](float focal_px, float steepest) {
+    return kSlackRatio * sigmas * (focal_px * scale * (1 + steepest) + dilation_px) + kSlackPx;
+  };
+  return touches({view.fx_px * tan_x.low + view.cx_px, view.fx_px * tan_x.high + view.cx_px},
+                 reach(view.fx_px, steepest_x), view.width_px) &&
+         touches({view.fy_px * tan_y.low + view.cy_px, view.fy_px * tan_y.high + view.cy_px},
+                 reach(view.fy_px, steepest_y), view.height_px);
+}
+
+// At least the largest singular value of A, and 1 for a rotation: the largest eigenvalue of A^T A
+// is at most its largest row sum of magnitudes (Gershgorin).
+float largest_stretch(const float* a) {
+  float largest = 0;
+  for (int i = 0; i < 3; ++i) {
+    float sum = 0;
+    for (int j = 0; j < 3; ++j) {
+      sum += std::fabs(a[i] * a[j] + a[3 + i] * a[3 + j] + a[6 + i] * a[6 + j]);
+    }
+    largest = std::max(largest, sum);
+  }
+  return std::sqrt(largest);
+}
+
+}  // namespace
+
+GaussianBounds bounds_of(const HeadDecoding& decoding) {
+  const float largest = decoding.offset_scale_m * decoding.max_offset * std::sqrt(3.0f);
+  return {.offset_m = decoding.max_offset == 0 ? std::numeric_limits<float>::infinity() : largest,
+          .extents = exp_float(decoding.max_log_scale)};
+}
+
+bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
+                 const GaussianBounds& bounds, const kernels::View& view) {
+  // Standard deviations at which an opacity of 1 falls to the cut: sqrt(2 ln(1 / cut)).
+  constexpr float kTwoLn2 = 1.38629436f;
+  const float sigmas = std::sqrt(kTwoLn2 * log2_float(1 / view.alpha_cut) + 1e-2f);
+  for (uint32_t lane = 0; lane < kernels::kLanes; ++lane) {
+    float a[9], centre[3];
+    for (uint32_t i = 0; i < 9; ++i) a[i] = transforms.linear[i][lane];
+    for (uint32_t i = 0; i < 3; ++i) {
+      centre[i] = transforms.own_translation_m[i][lane];
+      for (uint32_t j = 0; j < 3; ++j) centre[i] += a[3 * i + j] * texels.position_m[j][lane];
+    }
+    const float stretch = largest_stretch(a) * kSlackRatio;
+    float magnitude = 1;
+    for (int i = 0; i < 3; ++i) {
+      magnitude =
+          std::max({magnitude, std::fabs(centre[i]), std::fabs(view.view_from_world[4 * i + 3])});
+    }
+    const float radius_m = stretch * bounds.offset_m + 1e-5f * magnitude;
+    const float deviation_m = stretch * bounds.extents * texels.extent_m[lane];
+    // Written so that anything not comparable counts as seen.
+    if (!(radius_m < std::numeric_limits<float>::max())) return true;
+    if (sphere_may_be_seen(centre, radius_m, deviation_m, sigmas, view)) return true;
+  }
+  return false;
+}
+
+}  // namespace figurine

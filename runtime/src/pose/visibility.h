@@ -1,0 +1,29 @@
+// Which texels of a posed avatar a camera may see, before its network has said where their
+// Gaussians lie: from the bounds that the head's decoding has.
+//
+// Conservative: a block is left out only where no Gaussian that its texels could hold would touch a
+// pixel in projection's own arithmetic (kernels/project_block), rounding included.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "figurine/avatar.h"
+#include "runtime/src/base/thread_pool.h"
+#include "runtime/src/kernels/kernel.h"
+#include "runtime/src/pose/transforms.h"
+
+namespace figurine {
+
+// Of every Gaussian of an avatar in its canonical pose.
+struct GaussianBounds {
+  float offset_m = 0;  // between texel and centre; infinite: there is no bound
+  float extents = 0;   // the largest deviation in units of CanonicalBlock::extent_m
+};
+GaussianBounds bounds_of(const HeadDecoding& decoding);
+
+// Whether a block has a texel that may be seen.
+bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
+                 const GaussianBounds& bounds, const kernels::View& view);
+
+}  // namespace figurine

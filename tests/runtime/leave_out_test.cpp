@@ -1,0 +1,154 @@
+// Leaving out is exact: every switch changes what is computed and none changes a pixel; and
+// instruction sets and threads do not either.
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "formats/writer/package_writer.h"
+#include "runtime/splat_scene.h"
+#include "runtime/test_packages.h"
+
+namespace figurine {
+namespace {
+
+using tests::SyntheticBody;
+using tests::SyntheticPose;
+
+// A test avatar whose offsets have a bound, as no package of version 0.1 has.
+struct BoundedAvatar {
+  tests::SyntheticAvatar unbounded;
+  Avatar avatar;
+};
+
+BoundedAvatar make_bounded_avatar(const SyntheticBody& body, tests::Held held) {
+  BoundedAvatar bounded{.unbounded = tests::make_test_avatar(body, {.channels = 8, .held = held}),
+                        .avatar = {}};
+  bounded.avatar = bounded.unbounded.package->avatar();
+  bounded.avatar.decoding.max_offset = 1;
+  bounded.avatar.decoding.max_log_scale = 0.5f;
+  return bounded;
+}
+
+class LeaveOutScene : public ::testing::TestWithParam<tests::Held> {
+ protected:
+  // Close up, so that part of the body is outside; opaque and faint Gaussians in front of it.
+  LeaveOutScene() {
+    camera_ = *make_orbit_camera({.distance_m = 0.8f, .target_m = {0.1f, 0.1f, 0}}, 150, 110);
+    tests::Random random(5);
+    for (int i = 0; i < 600; ++i) {
+      cloud_.add_ball({random.uniform(-1, 1), random.uniform(0, 2), random.uniform(-0.5f, 0.5f)},
+                      random.uniform(0.002f, 0.1f), random.uniform(0, 1) < 0.2f ? 0.003f : 0.9f,
+                      {random.uniform(0, 1), 0.5f, 0.25f});
+    }
+  }
+
+  struct Drawn {
+    std::vector<float> rgba;
+    FrameStatistics statistics;
+  };
+  Drawn draw(const LeaveOut& leave_out, uint32_t threads = 1,
+             std::optional<Isa> isa = std::nullopt) {
+    Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = threads, .isa = isa});
+    FIG_CHECK(renderer.ok(), renderer.status().message().c_str());
+    const Result<AvatarId> id = (*renderer)->add_avatar(avatar_.avatar, *body_.package);
+    FIG_CHECK(id.ok(), id.status().message().c_str());
+    const FrameAvatar seen[] = {{.avatar = *id, .pose = pose_.view()}};
+    const GaussianView cloud = cloud_.view();
+    Drawn drawn{.rgba = tests::render(**renderer, {.camera = camera_,
+                                                   .avatars = seen,
+                                                   .gaussians = {&cloud, 1},
+                                                   .background = std::nullopt,
+                                                   .splat = {},
+                                                   .leave_out = leave_out})
+                            .rgba,
+                .statistics = (*renderer)->statistics()};
+    return drawn;
+  }
+
+  SyntheticBody body_ = tests::make_test_body({.uv_size = 32, .joints = 5});
+  BoundedAvatar avatar_ = make_bounded_avatar(body_, GetParam());
+  SyntheticPose pose_ = tests::make_test_pose(body_.body(), 2);
+  tests::Scene cloud_;
+  Camera camera_;
+};
+
+constexpr LeaveOut kNothing{.hidden_texels = false,
+                            .transparent = false,
+                            .outside = false,
+                            .missed_tiles = false,
+                            .stopped = false};
+
+TEST_P(LeaveOutScene, EverySwitchIsExactAndCounted) {
+  const Drawn all = draw({}), none = draw(kNothing);
+  ASSERT_EQ(all.rgba, none.rgba);
+  const FrameStatistics::LeftOut& left_out = all.statistics.left_out;
+  EXPECT_GT(left_out.hidden_texels, 0u);
+  EXPECT_GT(left_out.transparent, 0u);
+  EXPECT_GT(left_out.outside, 0u);
+  EXPECT_GT(left_out.missed_tiles, 0u);
+  EXPECT_GT(left_out.stopped, 0u);
+  EXPECT_EQ(none.statistics.left_out.hidden_texels, 0u);
+  EXPECT_EQ(none.statistics.left_out.transparent, 0u);
+  EXPECT_EQ(none.statistics.left_out.outside, 0u);
+  EXPECT_EQ(none.statistics.left_out.missed_tiles, 0u);
+  EXPECT_EQ(none.statistics.left_out.stopped, 0u);
+  EXPECT_EQ(all.statistics.blends, none.statistics.blends)
+      << "contributions that count are the same";
+  EXPECT_LT(all.statistics.visible, none.statistics.visible);
+  EXPECT_LT(all.statistics.pairs, none.statistics.pairs);
+  EXPECT_EQ(all.statistics.gaussians + left_out.hidden_texels, none.statistics.gaussians);
+}
+
+TEST_P(LeaveOutScene, EachSwitchAloneIsExact) {
+  const std::vector<float> truth = draw(kNothing).rgba;
+  for (const auto member : {&LeaveOut::hidden_texels, &LeaveOut::transparent, &LeaveOut::outside,
+                            &LeaveOut::missed_tiles, &LeaveOut::stopped}) {
+    LeaveOut one = kNothing;
+    one.*member = true;
+    ASSERT_EQ(draw(one).rgba, truth);
+  }
+}
+
+TEST_P(LeaveOutScene, AnyThreadsAndInstructionSetGiveTheSamePicture) {
+  const Drawn truth = draw({}, 1, Isa::kBaseline);
+  for (const Isa isa : supported_isas()) {
+    for (const uint32_t threads : {1u, 2u, 3u}) {
+      const Drawn other = draw({}, threads, isa);
+      ASSERT_EQ(other.rgba, truth.rgba) << to_string(isa) << ", " << threads << " threads";
+      EXPECT_EQ(other.statistics.blends, truth.statistics.blends);
+      EXPECT_EQ(other.statistics.left_out.stopped, truth.statistics.left_out.stopped);
+    }
+  }
+}
+
+TEST_P(LeaveOutScene, AnAvatarBehindTheCameraCostsNoNetwork) {
+  camera_ = *make_orbit_camera({.distance_m = 3, .target_m = {0, 0.9f, 6}}, 64, 64);
+  camera_.view_from_world[11] -= 20;  // the body is now well behind
+  const Drawn drawn = draw({});
+  EXPECT_EQ(drawn.statistics.macs, 0u);
+  EXPECT_EQ(drawn.statistics.left_out.hidden_texels, body_.body().texel_count());
+  EXPECT_EQ(drawn.rgba, draw(kNothing).rgba);
+}
+
+INSTANTIATE_TEST_SUITE_P(Precisions, LeaveOutScene,
+                         ::testing::Values(tests::Held::kFloat32, tests::Held::kFixedPoint),
+                         [](const auto& of) {
+                           return of.param == tests::Held::kFloat32 ? "f32" : "q8";
+                         });
+
+TEST(RendererIsa, IsWhatWasAskedForOrRefused) {
+  const auto renderer = Renderer::create({.isa = Isa::kBaseline});
+  ASSERT_TRUE(renderer.ok());
+  EXPECT_EQ((*renderer)->isa(), Isa::kBaseline);
+  EXPECT_EQ((*Renderer::create({}))->isa(), supported_isas().back());
+#if defined(__x86_64__)
+  const auto refused = Renderer::create({.isa = Isa::kNeon});
+#else
+  const auto refused = Renderer::create({.isa = Isa::kAvx2});
+#endif
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.status().code(), StatusCode::kUnsupported);
+}
+
+}  // namespace
+}  // namespace figurine
