@@ -1,10 +1,13 @@
-"""Writes docs/results/gradients.json, splat_oracle.json, stability.json, bench.json and network_bench.json from programs of preset dev.
+"""Writes docs/results/gradients.json, splat_oracle.json, stability.json, bench.json and
+network_bench.json from programs of preset dev.
 
     scripts/run python3 scripts/experiments/checks.py
 
-gradients: finite differences of every gradient in float64; splat_oracle: `figurine splat` against the float64 oracle through files; stability: the table of
-extreme cases; bench: the shipped avatar per stage, in the release build; network_bench: the networks
-of edge and paper alone, in float, in fixed point and with ranges found at run time. The first three do not depend on the machine's mood; keep it quiet for the others.
+gradients: finite differences of every gradient in float64; splat_oracle: `figurine splat` against
+the float64 oracle through files; stability: the table of extreme cases; bench: the shipped avatar
+per stage, in the release build; network_bench: the networks of edge and paper alone, in float, in
+fixed point and with ranges found at run time. The first three do not depend on the machine's mood;
+keep it quiet for the others.
 """
 
 import datetime
@@ -14,6 +17,8 @@ import pathlib
 import platform
 import re
 import subprocess
+
+import results
 
 RESULTS = pathlib.Path("docs/results")
 
@@ -34,9 +39,7 @@ def write(name, content, command):
         "machine": {"architecture": platform.machine(), "cores": os.cpu_count(), "cpu": cpu()},
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
     }
-    temporary = RESULTS / (name + ".json.tmp")
-    temporary.write_text(json.dumps(content, indent=2) + "\n")
-    temporary.replace(RESULTS / (name + ".json"))
+    results.write(RESULTS / (name + ".json"), content)
 
 
 def main():

@@ -1,10 +1,14 @@
-"""Writes docs/results/folds.json: what the folds of the pose are worth in the captures' own pictures, and what a capture costs.
+"""Writes docs/results/folds.json: what the folds of the pose are worth in the captures' own
+pictures, and what a capture costs.
 
-    scripts/run python3 scripts/experiments/folds.py [FOLDER]        FOLDER (default out/folds) keeps the captures; from preset dev
+    scripts/run python3 scripts/experiments/folds.py [FOLDER]
 
-Folds: the same people, poses and cameras with the folds of every pose (the truth), with those of the rest pose and without any; PSNR over the pixels whose
-true alpha exceeds 0.5, on stored values, pooled (docs/numerics.md, "Picture quality"). The outline is the same in all three, so the background cancels. JPEG's own
-error (quality 97) is in all of them.
+FOLDER (default out/folds) keeps the captures; from preset dev.
+
+Folds: the same people, poses and cameras with the folds of every pose (the truth), with those of
+the rest pose and without any; PSNR over the pixels whose true alpha exceeds 0.5, on stored values,
+pooled (docs/numerics.md, "Picture quality"). The outline is the same in all three, so the
+background cancels. JPEG's own error (quality 97) is in all of them.
 Cost: CPU seconds of one identity of 300 images, start-up included.
 """
 
@@ -18,6 +22,8 @@ import re
 import resource
 import subprocess
 import sys
+
+import results
 
 TOOL = "build/dev/toolchain/cli/figurine-train"
 SEEDS = [38, 41, 7]
@@ -98,9 +104,7 @@ def main():
         "machine": {"architecture": platform.machine(), "cores": os.cpu_count(), "cpu": cpu(), "load": round(os.getloadavg()[0], 1)},
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
     }
-    temporary = pathlib.Path("docs/results/folds.json.tmp")
-    temporary.write_text(json.dumps(result, indent=2) + "\n")
-    temporary.replace("docs/results/folds.json")
+    results.write(pathlib.Path("docs/results/folds.json"), result)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""Draws docs/results/generation.json: where members are decided, what more people to learn from change, how the trainings went.
+"""Draws docs/results/generation.json and the CSV files beside it: where members are decided, what
+more people to learn from change, how the trainings went.
 
     generation_plots.py RESULTS OUTPUT
 
@@ -16,6 +17,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plot
 
+import results
+
 COLOURS = {"layer": "#1f77b4", "flat": "#ff7f0e", "latent": "#2ca02c", "basis": "#d62728"}
 
 
@@ -23,16 +26,18 @@ def variant_of(run):
     return re.sub(r"_.*", "", run)
 
 
-def draw_entropy(axes, generation):
+def draw_entropy(axes, generation, rows):
     for name, style in (("nano", "-"), ("edge", "--")):
         for run in generation.get(name, {}).get("runs", []):
             entropy = run.get("posterior_entropy")
             if entropy is None or "_" in run["name"]:
                 continue
-            levels = [level for level in entropy["levels"] if level["dimension_snr"] < 1e4]
+            own = [row for row in rows if (row["population"], row["run"]) == (name, run["name"])]
+            levels = [(float(row["dimension_snr"]), float(row["nats"])) for row in own]
+            levels = [(snr, nats / entropy["undecided_nats"]) for snr, nats in levels if snr < 1e4]
             members = round(2.718281828 ** entropy["undecided_nats"])
-            axes.semilogx([level["dimension_snr"] for level in levels], [level["nats"] / entropy["undecided_nats"] for level in levels], style,
-                          color=COLOURS[run["name"]], label=f"{name}, {run['name']}, N {members}")
+            axes.semilogx(*zip(*levels), style, color=COLOURS[run["name"]],
+                          label=f"{name}, {run['name']}, N {members}")
     axes.axvspan(0.1, 100, color="#eeeeee", zorder=0)
     axes.set(xlabel="D x SNR (grey: the band with half of the levels)", ylabel="posterior entropy / ln N", title="Where it is decided who it will be")
     axes.legend(fontsize=7)
@@ -72,12 +77,12 @@ def draw_losses(axes, path):
 
 
 def main():
-    results, output = pathlib.Path(sys.argv[1]), sys.argv[2]
-    generation = json.loads((results / "generation.json").read_text())
+    folder, output = pathlib.Path(sys.argv[1]), sys.argv[2]
+    generation = json.loads((folder / "generation.json").read_text())
     figure, axes = plot.subplots(1, 3, figsize=(15, 4.4), dpi=80)
-    draw_entropy(axes[0], generation)
+    draw_entropy(axes[0], generation, results.read_rows(folder / "generation_entropy.csv"))
     draw_people(axes[1], generation["nano"])
-    draw_losses(axes[2], results / "sampler_loss_nano.csv")
+    draw_losses(axes[2], folder / "sampler_loss_nano.csv")
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()

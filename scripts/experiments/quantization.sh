@@ -34,4 +34,6 @@ for run in "${runs[@]}"; do
 done
 
 step "docs/results/quantization.json"
-train evaluate quantization "${measured[@]}" --motion "$folder/walk_straight.fgn" --qat-iterations "$qat_iterations" --threads "$threads" -o docs/results/quantization.json
+train evaluate quantization "${measured[@]}" --motion "$folder/walk_straight.fgn" \
+  --qat-iterations "$qat_iterations" --threads "$threads" -o "$folder/quantization.json"
+scripts/run python3 scripts/experiments/quantization_report.py "$folder" docs/results
