@@ -52,7 +52,8 @@ class Results(unittest.TestCase):
     def test_rows_come_back_from_csv(self):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder, "rows.csv")
-            results.write_rows(path, [{"name": "a, b", "value": 2 / 3}, {"name": "c", "value": None}])
+            rows = [{"name": "a, b", "value": 2 / 3}, {"name": "c", "value": None}]
+            results.write_rows(path, rows)
             expected = [{"name": "a, b", "value": "0.666667"}, {"name": "c", "value": ""}]
             self.assertEqual(results.read_rows(path), expected)
             results.write_rows(path, [])
