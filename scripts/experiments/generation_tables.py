@@ -1,4 +1,4 @@
-"""Prints the tables of docs/generation.md from docs/results/generation.json, in Markdown.
+"""Prints the tables of docs/reports/sampler_*.md from docs/results/generation.json, in Markdown.
 
     generation_tables.py RESULTS NAME        NAME of the population: edge, nano
 """
@@ -23,53 +23,75 @@ def percents(*numbers):
     return ", ".join(text(number, "{:.0f} %") for number in numbers)
 
 
-def copies(novelty):
-    shares = [novelty["pictures"]["copy_share"]]
-    if NETWORK in novelty.get("perceptual", {}):
-        shares.append(novelty["perceptual"][NETWORK]["copy_share"])
-    return " / ".join(f"{100 * share:.0f} %" for share in shares)
+def percent(share):
+    return f"{100 * share:.0f} %"
 
 
-def columns_of(row):
+def draws_of(part):
+    draws = part.get("draws")
+    return percents(draws["coverage_percent"], draws["one_nna_percent"]) if draws else ""
+
+
+def in_pictures(row):
     part, train, novelty = row.get("held_out", {}), row.get("train", {}), row.get("novelty")
-    draws, near = part.get("draws", {}), part.get("perceptual", {}).get(NETWORK, {})
-    cells = [
+    return [
         text(value(part.get("mmd_psnr_db")), "{:.1f} dB"),
         text(value(part.get("coverage_percent")), "{:.0f} %"),
         text(value(part.get("one_nna_percent")), "{:.0f} %"),
-        percents(draws["coverage_percent"], draws["one_nna_percent"]) if draws else "",
+        draws_of(part),
         text(value(train.get("one_nna_percent")), "{:.0f} %"),
-        copies(novelty) if novelty else "",
+        percent(novelty["pictures"]["copy_share"]) if novelty else "",
         text(novelty["pictures"]["median_ratio"], "{:.2f}") if novelty else "",
         text(row.get("highpass_ratio"), "{:.2f}"),
     ]
-    if near:
-        cells.append(f"{value(near['mmd']):.2f}, " + percents(value(near["coverage_percent"]), value(near["one_nna_percent"])))
-        cells.append(percents(near["draws"]["coverage_percent"], near["draws"]["one_nna_percent"]) if "draws" in near else "")
-    else:
-        cells += ["", ""]
-    cells.append(text(value(part.get("kid", {}).get(NETWORK)), "{:.2f}"))
-    cells.append(text(value(part.get("frechet", {}).get(NETWORK, {})), "{:.1f}"))
-    return cells
+
+
+def through_the_network(row):
+    part = row.get("held_out", {})
+    near = part.get("perceptual", {}).get(NETWORK, {})
+    novelty = row.get("novelty", {}).get("perceptual", {}).get(NETWORK)
+    return [
+        text(value(near.get("mmd")), "{:.2f}"),
+        text(value(near.get("coverage_percent")), "{:.0f} %"),
+        text(value(near.get("one_nna_percent")), "{:.0f} %"),
+        draws_of(near),
+        percent(novelty["copy_share"]) if novelty else "",
+        text(value(part.get("kid", {}).get(NETWORK)), "{:.2f}"),
+        text(value(part.get("frechet", {}).get(NETWORK, {})), "{:.1f}"),
+    ]
+
+
+def against_captures(row):
+    part = row.get("held_out_captures", {})
+    return [
+        text(value(part.get("mmd_psnr_db")), "{:.1f} dB"),
+        text(value(part.get("coverage_percent")), "{:.0f} %"),
+        text(value(part.get("one_nna_percent")), "{:.0f} %"),
+        draws_of(part),
+    ]
 
 
 def table(titles, rows):
-    print("| | " + " | ".join(titles) + " |")
-    print("|---" * (len(titles) + 1) + "|")
+    """Without the rows and the columns that have nothing in them."""
+    rows = [(name, cells) for name, cells in rows if any(cells)]
+    used = [k for k in range(len(titles)) if any(cells[k] for _, cells in rows)]
+    print("| | " + " | ".join(titles[k] for k in used) + " |")
+    print("|---" * (len(used) + 1) + "|")
     for name, cells in rows:
-        print(f"| {name} | " + " | ".join(cells) + " |")
+        print(f"| {name} | " + " | ".join(cells[k] for k in used) + " |")
     print()
 
 
 def main():
-    report = json.loads((pathlib.Path(sys.argv[1]) / "generation.json").read_text())[sys.argv[2]]
-    titles = ["MMD to held out, PSNR", "COV", "1-NNA", "COV, 1-NNA of all draws", "1-NNA to training", "copies", "nearest member", "sharpness",
-              "MMD, COV, 1-NNA by the network", "COV, 1-NNA of all draws by it", "KID", "Frechet"]
-    table(titles, [(row["name"], columns_of(row)) for row in report["rows"]])
-    against = [(row["name"], row["held_out_captures"]) for row in report["rows"] if "held_out_captures" in row]
-    table(["MMD to captures", "COV", "1-NNA", "COV, 1-NNA of all draws"],
-          [(name, [f"{value(part['mmd_psnr_db']):.1f} dB", f"{value(part['coverage_percent']):.0f} %", f"{value(part['one_nna_percent']):.0f} %",
-                   percents(part["draws"]["coverage_percent"], part["draws"]["one_nna_percent"]) if "draws" in part else ""]) for name, part in against])
+    report = json.loads((pathlib.Path(sys.argv[1]) / "generation.json").read_text())
+    rows = report[sys.argv[2]]["rows"]
+    distances = ["COV", "1-NNA", "COV, 1-NNA of draws"]
+    for titles, cells_of in [
+        (["MMD", *distances, "1-NNA, training", "copies", "nearest", "sharpness"], in_pictures),
+        (["MMD", *distances, "copies", "KID", "Frechet"], through_the_network),
+        (["MMD", *distances], against_captures),
+    ]:
+        table(titles, [(row["name"], cells_of(row)) for row in rows])
 
 
 if __name__ == "__main__":

@@ -1,61 +1,70 @@
-"""Puts a population's figures together: FOLDER/members/*.json and FOLDER/report.json -> one object of docs/results/population.json.
+"""Puts a population's figures together: FOLDER/members/*.json and FOLDER/report.json -> one object
+of docs/results/population.json, and the spectra of its weights as population_spectrum_NAME.csv.
 
     population_report.py FOLDER NAME OUTPUT COMMAND
 
-FOLDER is a state folder of `figurine-train population`; its report.json is by `figurine-train evaluate members`. Nothing is computed here but means. Also
-writes FOLDER/worst.txt: the ten members with the lowest PSNR on held-out poses, worst first. Objects of other names in OUTPUT stay.
+FOLDER is a state folder of `figurine-train population`; its report.json is by `figurine-train
+evaluate members`. Nothing is computed here but means and sums. Also writes FOLDER/worst.txt: the
+ten members with the lowest PSNR on held-out poses, worst first. Objects of other names in OUTPUT
+stay.
 """
 
-import datetime
+import itertools
 import json
-import os
 import pathlib
 import statistics
 import sys
 
+import results
+
 CORES = 2  # people are made side by side, one a core
-
-
-def read(path):
-    return json.loads(path.read_text()) if path.exists() else None
 
 
 def metric(row, group, name):
     return row["quality"][group][name]
 
 
-def describe(values):
+def describe(values, best=max):
     values = [v for v in values if v is not None]
     if not values:
         return None
     return {
         "mean": statistics.fmean(values),
-        "worst": min(values),
-        "best": max(values),
+        "worst": (min if best is max else max)(values),
+        "best": best(values),
         "deviation": statistics.pstdev(values),
         "count": len(values),
     }
+
+
+def above_flat_db(row):
+    poses = row["quality"]["held_out_poses"]
+    return poses["psnr_db"] - poses["flat_psnr_db"]
 
 
 def spread(rows):
     return {
         "psnr_view_db": describe([metric(r, "held_out_views", "psnr_db") for r in rows]),
         "psnr_pose_db": describe([metric(r, "held_out_poses", "psnr_db") for r in rows]),
-        "psnr_pose_interleaved_db": describe([metric(r, "held_out_poses_interleaved", "psnr_db") for r in rows]),
-        "psnr_pose_block_db": describe([metric(r, "held_out_poses_block", "psnr_db") for r in rows]),
+        "psnr_pose_interleaved_db": describe(
+            [metric(r, "held_out_poses_interleaved", "psnr_db") for r in rows]
+        ),
+        "psnr_pose_block_db": describe(
+            [metric(r, "held_out_poses_block", "psnr_db") for r in rows]
+        ),
         "head_psnr_db": describe([metric(r, "held_out_poses", "head_psnr_db") for r in rows]),
         "flat_psnr_db": describe([metric(r, "held_out_poses", "flat_psnr_db") for r in rows]),
-        "above_flat_db": describe([metric(r, "held_out_poses", "psnr_db") - metric(r, "held_out_poses", "flat_psnr_db") for r in rows]),
+        "above_flat_db": describe([above_flat_db(r) for r in rows]),
         "highpass_ratio": describe([metric(r, "held_out_poses", "highpass_ratio") for r in rows]),
         "difference_psnr_db": describe([r["quality"]["difference_psnr_db"] for r in rows]),
     }
 
 
 def frozen_gain(rows):
-    gains = [
-        metric(r, "held_out_poses", "psnr_db") - r["frozen_pose"]["held_out_poses"]["psnr_db"] for r in rows if "frozen_pose" in r
-    ]
-    return describe(gains)
+    posed = lambda quality: quality["held_out_poses"]["psnr_db"]
+    return describe(
+        [posed(r["quality"]) - posed(r["frozen_pose"]) for r in rows if "frozen_pose" in r]
+    )
 
 
 # What the shared initial weights are worth: the same people, the same budget, from random weights.
@@ -74,23 +83,58 @@ def initial_weights(rows):
                 "from_scratch_db": statistics.fmean(b[2] for _, b in here),
             }
         )
-    gain = lambda group: describe([metric(r, group, "psnr_db") - r["from_scratch"]["quality"][group]["psnr_db"] for r in pairs])
-    return {"gain_views_db": gain("held_out_views"), "gain_poses_db": gain("held_out_poses"), "curve": curve}
+
+    def gain(group):
+        scratch = [r["from_scratch"]["quality"][group]["psnr_db"] for r in pairs]
+        return describe([metric(r, group, "psnr_db") - s for r, s in zip(pairs, scratch)])
+
+    return {
+        "gain_views_db": gain("held_out_views"),
+        "gain_poses_db": gain("held_out_poses"),
+        "curve": curve,
+    }
 
 
 def rounding(rows):
-    losses = {f"{r['identity']} {g}": r["rounding"][g]["loss_db"] for r in rows if "rounding" in r for g in ("views", "poses")}
+    losses = {
+        f"{r['identity']} {group}": r["rounding"][group]["loss_db"]
+        for r in rows
+        if "rounding" in r
+        for group in ("views", "poses")
+    }
     return {"losses_db": losses, "worst_db": max(losses.values(), default=None)}
 
 
+def shortened_spectrum(spectrum):
+    """Takes the share of variance of every direction out of the spectrum and leaves what the first
+    1, 2, 4, ... hold together; returns the shares, a row a direction."""
+    columns = {token["name"]: token for token in spectrum["tokens"]} | {"whole": spectrum["whole"]}
+    shares = {name: part.pop("variance_share") for name, part in columns.items()}
+    for name, part in columns.items():
+        held = list(itertools.accumulate(shares[name]))
+        ranks = [2**k for k in range(len(held).bit_length())]
+        part["variance_of_first"] = {str(rank): held[rank - 1] for rank in ranks}
+    directions = range(max(map(len, shares.values()), default=0))
+    cell = lambda values, k: f"{values[k]:.3g}" if k < len(values) else None
+    return [
+        {"direction": k + 1} | {name: cell(values, k) for name, values in shares.items()}
+        for k in directions
+    ]
+
+
 def main():
-    folder, name, output, command = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), sys.argv[4]
+    folder, name, output = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3])
     rows = [json.loads(p.read_text()) for p in sorted((folder / "members").glob("*.json"))]
     if not rows:
         sys.exit(f"population_report.py: {folder}: has no members yet")
-    report = read(folder / "report.json") or {}
-    report.get("distances", {}).pop("members", None)  # everybody's own neighbours stay in the folder: hundreds of rows
-    parts = {part: [r for r in rows if r["split"] == part] for part in ("train", "validation", "test")}
+    report = results.read(folder / "report.json") or {}
+    # Everybody's own neighbours stay in the folder: hundreds of rows.
+    report.get("distances", {}).pop("members", None)
+    if "spectrum" in report:
+        directions = shortened_spectrum(report["spectrum"])
+        results.write_rows(output.with_name(f"population_spectrum_{name}.csv"), directions)
+    names = ("train", "validation", "test")
+    parts = {part: [r for r in rows if r["split"] == part] for part in names}
     everybody = spread(rows)
     gain = frozen_gain(rows)
     worst = sorted(rows, key=lambda r: metric(r, "held_out_poses", "psnr_db"))[:10]
@@ -108,9 +152,10 @@ def main():
         "bytes": package.stat().st_size if package.exists() else None,
         "span_db": report.get("span_db"),
         "seconds": {
-            "training_one_core": describe([r["train_seconds"] for r in rows]),
-            "capture_cpu": describe([r["capture_cpu_seconds"] for r in rows]),
-            "note": "seconds_per_avatar: two people are trained side by side, each on one core, so one costs two cores half its time",
+            "training_one_core": describe([r["train_seconds"] for r in rows], best=min),
+            "capture_cpu": describe([r["capture_cpu_seconds"] for r in rows], best=min),
+            "note": "seconds_per_avatar: two people are trained side by side, each on one core, "
+            "so one costs two cores half its time",
         },
         "all": everybody,
         "by_split": {part: spread(of_part) for part, of_part in parts.items() if of_part},
@@ -129,18 +174,16 @@ def main():
             for r in worst
         ],
         "members_report": report or None,
-        "command": command,
-        "commit": os.environ.get("FIGURINE_COMMIT", "unknown"),
         "machine": report.get("machine"),
-        "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
-    }
-    content = read(output) or {}
+    } | results.head(sys.argv[4])
+    content = results.read(output) or {}
     content[name] = result
-    temporary = output.with_suffix(".json.tmp")
-    temporary.write_text(json.dumps(content, indent=2) + "\n")
-    temporary.replace(output)
-    above = everybody["above_flat_db"]["mean"]
-    print(f"{name}: {len(rows)} members, held-out poses {result['psnr_pose_db_mean']:.2f} dB, {above:.2f} above flat, views {result['psnr_view_db_mean']:.2f} dB")
+    results.write(output, content)
+    print(
+        f"{name}: {len(rows)} members, held-out poses {result['psnr_pose_db_mean']:.2f} dB, "
+        f"{everybody['above_flat_db']['mean']:.2f} above flat, "
+        f"views {result['psnr_view_db_mean']:.2f} dB"
+    )
 
 
 if __name__ == "__main__":

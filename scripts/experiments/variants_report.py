@@ -1,24 +1,19 @@
-"""Puts an ablation's figures together: FOLDER/generation.json and the runs' losses -> docs/results/generation.json and sampler_loss_NAME.csv.
+"""Puts an ablation's figures together: FOLDER/generation.json and the runs' losses ->
+docs/results/generation.json, generation_entropy.csv and sampler_loss_NAME.csv.
 
     variants_report.py FOLDER NAME OUTPUT COMMAND RUN...
 
-FOLDER is that of scripts/experiments/variants.sh. Nothing is computed here. Objects of other names in generation.json stay.
+FOLDER is that of scripts/experiments/variants.sh. Nothing is computed here. Objects of other names
+in generation.json stay.
 """
 
 import csv
-import datetime
-import json
-import os
 import pathlib
 import sys
 
+import results
+
 STEP = 100  # iterations between rows of the losses
-
-
-def write(path, text):
-    fresh = path.with_suffix(path.suffix + ".tmp")
-    fresh.write_text(text)
-    os.replace(fresh, path)
 
 
 def losses(folder, runs):
@@ -28,19 +23,23 @@ def losses(folder, runs):
         with open(folder / run / "log.csv", encoding="utf-8") as log:
             for row in csv.DictReader(log):
                 if int(row["iteration"]) % STEP == 0:
-                    lines.append(f"{run},{row['iteration']},{float(row['seconds']):.0f},{row['loss']},{row['validation_loss']}")
+                    seconds = f"{float(row['seconds']):.0f}"
+                    cells = [run, row["iteration"], seconds, row["loss"], row["validation_loss"]]
+                    lines.append(",".join(cells))
     return "\n".join(lines) + "\n"
 
 
 def merged_losses(path, folder, runs):
     """Those of the runs, and what the file has of others."""
-    kept = [line for line in path.read_text().splitlines()[1:] if line.split(",")[0] not in runs] if path.exists() else []
+    before = path.read_text().splitlines()[1:] if path.exists() else []
+    kept = [line for line in before if line.split(",")[0] not in runs]
     head, *rows = losses(folder, runs).splitlines()
     return "\n".join([head, *rows, *kept]) + "\n"
 
 
 def keep_others(before, now):
-    """Rows of trainings that were not judged this time, with the commit and date that they are from, if they are of the same population."""
+    """Rows of trainings that were not judged this time, with the commit and date that they are
+    from, if they are of the same population."""
     if before.get("population_hash") != now["population_hash"]:
         return
     trained = {run["name"] for run in now["runs"]}
@@ -48,28 +47,51 @@ def keep_others(before, now):
         if run["name"] in trained:
             continue
         row = next(row for row in before["rows"] if row["name"] == run["name"])
-        row.setdefault("kept_from", {"commit": before["commit"], "date": before["date"]})
+        row.setdefault("kept_from", {key: before[key] for key in ("commit", "date")})
         now["rows"].insert(len(now["runs"]), row)
         now["runs"].append(run)
 
 
+def write_generation(output, generation):
+    """generation.json, sorted, and the posterior entropies of its runs, level by level, as
+    generation_entropy.csv. A run whose levels are not in its report keeps the rows it had."""
+    path = output / "generation_entropy.csv"
+    earlier = results.read_rows(path)
+    rows = []
+    for population, report in sorted(generation.items()):
+        for run in report["runs"]:
+            entropy = run.get("posterior_entropy")
+            if entropy is None:
+                continue
+            key = {"population": population, "run": run["name"]}
+            levels = entropy.pop("levels", None)
+            if levels is None:
+                rows += [row for row in earlier if key.items() <= row.items()]
+            else:
+                rows += [key | level for level in levels]
+    results.write_rows(path, rows)
+    results.write(output / "generation.json", sorted_keys(generation))
+
+
+def sorted_keys(value):
+    if isinstance(value, dict):
+        return {key: sorted_keys(value[key]) for key in sorted(value)}
+    return [sorted_keys(entry) for entry in value] if isinstance(value, list) else value
+
+
 def main():
-    folder, name, output, command, runs = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), sys.argv[4], sys.argv[5:]
-    report = json.loads((folder / "generation.json").read_text())
+    folder, name, output = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3])
+    command, runs = sys.argv[4], sys.argv[5:]
+    report = results.read(folder / "generation.json")
     del report["command"]  # of this machine's folders
-    path = output / "generation.json"
-    generation = json.loads(path.read_text()) if path.exists() else {}
+    generation = results.read(output / "generation.json") or {}
     before = generation.get(name, {})
-    generation[name] = {
-        "command": command,
-        "commit": os.environ.get("FIGURINE_COMMIT", "unknown"),
-        "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
-    } | report
+    generation[name] = results.head(command) | report
     keep_others(before, generation[name])
-    write(path, json.dumps(generation, indent=2, sort_keys=True) + "\n")
+    write_generation(output, generation)
 
     losses_path = output / f"sampler_loss_{name}.csv"
-    write(losses_path, merged_losses(losses_path, folder, runs))
+    results.write_text(losses_path, merged_losses(losses_path, folder, runs))
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ def commands():
     """The shell commands of the page, comments left out."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL) for line in block.replace("\\\n", " ").splitlines()]
-    return [command for command in (re.sub(r"\s+#.*", "", line).strip() for line in lines) if command]
+    return [command for command in (re.sub(r"(^|\s)#.*", "", line).strip() for line in lines) if command]
 
 
 def tool_commands():
