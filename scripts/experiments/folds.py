@@ -1,11 +1,15 @@
-"""Writes docs/results/folds.json: what the folds of the pose are worth in the captures' own pictures, and what a capture costs.
+"""Writes docs/results/folds.json: what the folds of the pose are worth in the captures' own
+pictures, and what a capture costs.
 
-    scripts/run python3 scripts/experiments/folds.py [FOLDER]        FOLDER (default out/folds) keeps the captures; from preset dev
+    scripts/run python3 scripts/experiments/folds.py [FOLDER]
 
-Folds: the same people, poses and cameras with the folds of every pose (the truth), with those of the rest pose and without any; PSNR over the pixels whose
-true alpha exceeds 0.5, on stored values, pooled (docs/numerics.md, "Picture quality"). The outline is the same in all three, so the background cancels. JPEG's own
-error (quality 97) is in all of them.
-Cost: CPU seconds of one identity of 300 images, start-up included.
+FOLDER (default out/folds) keeps the captures; the programs are those of preset dev.
+
+Folds: the same people, poses and cameras with the folds of every pose (the truth), with those of
+the rest pose and without any; PSNR over the pixels whose true alpha exceeds 0.5, on stored values,
+pooled (docs/numerics.md, "Picture quality"). The outline is the same in all three, so the
+background cancels. JPEG's own error (quality 97) is in all of them. Cost: CPU seconds of one
+identity of 300 images, start-up included.
 """
 
 import datetime
@@ -30,24 +34,31 @@ def text_of(*command):
 
 def capture(body, folder, *options):
     """Seconds of CPU. A folder that is there already is kept and costs nothing."""
-    if (folder / "000000/figurine.json").exists() and json.loads((folder / "000000/figurine.json").read_text())["complete"]:
+    record = folder / "000000/figurine.json"
+    if record.exists() and json.loads(record.read_text())["complete"]:
         return 0.0
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([TOOL, "capture", "--body", body, "--threads", "1", "--resume", "-o", folder, *options], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [TOOL, "capture", "--body", body, "--threads", "1", "--resume", "-o", folder, *options],
+        check=True, stdout=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def pixels(pattern, kind):
-    return subprocess.run(["ffmpeg", "-loglevel", "error", "-pattern_type", "glob", "-i", pattern, "-f", "rawvideo", "-pix_fmt", kind, "-"],
-                          check=True, stdout=subprocess.PIPE).stdout
+    command = [
+        "ffmpeg", "-loglevel", "error", "-pattern_type", "glob", "-i", pattern, "-f", "rawvideo",
+        "-pix_fmt", kind, "-"
+    ]
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout
 
 
 def squared_error(truth, other):
     total = count = 0
     for camera in sorted(path.name for path in (truth / "000000/images_lr").iterdir()):
         masks = pixels(f"{truth}/000000/fmask_lr/{camera}/*.png", "gray")
-        wanted, seen = (pixels(f"{folder}/000000/images_lr/{camera}/*.jpg", "rgb24") for folder in (truth, other))
+        wanted, seen = (pixels(f"{folder}/000000/images_lr/{camera}/*.jpg", "rgb24")
+                        for folder in (truth, other))
         for i, alpha in enumerate(masks):
             if alpha > 127:
                 for c in range(3 * i, 3 * i + 3):
@@ -70,13 +81,15 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     body = folder / "body.fgn"
     if not body.exists():
-        subprocess.run([TOOL, "body", "--makehuman", "--uv", "128", "-o", body], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([TOOL, "body", "--makehuman", "--uv", "128", "-o", body], check=True,
+                       stdout=subprocess.DEVNULL)
     people, pooled = [], {"rest": [0, 0], "off": [0, 0]}
     for seed in SEEDS:
         for mode in ("pose", "rest", "off"):
             capture(body, folder / f"{seed}_{mode}", "--seed", str(seed), "--folds", mode, *SHOTS)
         truth = folder / f"{seed}_pose"
-        row = {"seed": seed, "garment": json.loads((truth / "000000/figurine.json").read_text())["person"]["garment"]}
+        record = json.loads((truth / "000000/figurine.json").read_text())
+        row = {"seed": seed, "garment": record["person"]["garment"]}
         for mode in ("rest", "off"):
             error = squared_error(truth, folder / f"{seed}_{mode}")
             pooled[mode] = [a + b for a, b in zip(pooled[mode], error)]
@@ -84,7 +97,8 @@ def main():
         people.append(row)
     cost = {}
     for name, options in (("edge", ["--size", "512x512"]), ("nano", ["--size", "128x128"])):
-        seconds = capture(body, folder / f"cost_{name}", "--seed", "38", "--frames", "25", "--views", "12", *options)
+        seconds = capture(body, folder / f"cost_{name}", "--seed", "38", "--frames", "25",
+                          "--views", "12", *options)
         if seconds:
             cost[f"{name}_25_poses_12_views_cpu_s"] = round(seconds, 1)
     result = {
@@ -95,7 +109,10 @@ def main():
         "cost": cost,
         "command": "scripts/run python3 scripts/experiments/folds.py",
         "commit": text_of("git", "-c", "safe.directory=*", "rev-parse", "HEAD").strip(),
-        "machine": {"architecture": platform.machine(), "cores": os.cpu_count(), "cpu": cpu(), "load": round(os.getloadavg()[0], 1)},
+        "machine": {
+            "architecture": platform.machine(), "cores": os.cpu_count(), "cpu": cpu(),
+            "load": round(os.getloadavg()[0], 1)
+        },
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
     }
     temporary = pathlib.Path("docs/results/folds.json.tmp")

@@ -1,4 +1,5 @@
-"""Draws docs/results/generation.json: where members are decided, what more people to learn from change, how the trainings went.
+"""Draws docs/results/generation.json: where members are decided, what more people to learn from
+change, how the trainings went.
 
     generation_plots.py RESULTS OUTPUT
 
@@ -31,25 +32,31 @@ def draw_entropy(axes, generation):
                 continue
             levels = [level for level in entropy["levels"] if level["dimension_snr"] < 1e4]
             members = round(2.718281828 ** entropy["undecided_nats"])
-            axes.semilogx([level["dimension_snr"] for level in levels], [level["nats"] / entropy["undecided_nats"] for level in levels], style,
+            axes.semilogx([level["dimension_snr"] for level in levels],
+                          [level["nats"] / entropy["undecided_nats"] for level in levels], style,
                           color=COLOURS[run["name"]], label=f"{name}, {run['name']}, N {members}")
     axes.axvspan(0.1, 100, color="#eeeeee", zorder=0)
-    axes.set(xlabel="D x SNR (grey: the band with half of the levels)", ylabel="posterior entropy / ln N", title="Where it is decided who it will be")
+    axes.set(xlabel="D x SNR (grey: the band with half of the levels)",
+             ylabel="posterior entropy / ln N", title="Where it is decided who it will be")
     axes.legend(fontsize=7)
 
 
 def draw_people(axes, report):
     rows = {row["name"]: row for row in report["rows"]}
     for variant in ("layer", "basis"):
-        points = sorted((row["learnt_from"], row) for name, row in rows.items() if variant_of(name) == variant and "novelty" in row)
+        points = sorted((row["learnt_from"], row) for name, row in rows.items()
+                        if variant_of(name) == variant and "novelty" in row)
         size = [point[0] for point in points]
-        axes.semilogx(size, [100 * row["novelty"]["pictures"]["copy_share"] for _, row in points], "o-", color=COLOURS[variant],
-                      label=f"{variant}: near copies, %")
-        axes.semilogx(size, [100 * row["novelty"]["pictures"]["median_ratio"] for _, row in points], "s:", color=COLOURS[variant],
+        axes.semilogx(size, [100 * row["novelty"]["pictures"]["copy_share"] for _, row in points],
+                      "o-", color=COLOURS[variant], label=f"{variant}: near copies, %")
+        axes.semilogx(size, [100 * row["novelty"]["pictures"]["median_ratio"] for _, row in points],
+                      "s:", color=COLOURS[variant],
                       label=f"{variant}: nearest member, % of members' own")
     held_out = rows["held-out members"]["novelty"]["pictures"]
-    axes.axhline(100 * held_out["copy_share"], color="grey", linewidth=0.8, label="held-out people: near copies, %")
-    axes.axhline(100 * held_out["median_ratio"], color="grey", linewidth=0.8, linestyle=":", label="held-out people: nearest member, %")
+    axes.axhline(100 * held_out["copy_share"], color="grey", linewidth=0.8,
+                 label="held-out people: near copies, %")
+    axes.axhline(100 * held_out["median_ratio"], color="grey", linewidth=0.8, linestyle=":",
+                 label="held-out people: nearest member, %")
     axes.set(xlabel="people to learn from", title="Copies and newness of samples, nano")
     axes.set_xticks([50, 100, 250, 500], ["50", "100", "250", "500"])
     axes.minorticks_off()
@@ -64,10 +71,13 @@ def draw_losses(axes, path):
         if "_" in run:
             continue
         own = [row for row in rows if row["run"] == run]
-        axes.plot([int(row["iteration"]) for row in own], [float(row["loss"]) for row in own], color=COLOURS[run], label=run)
+        axes.plot([int(row["iteration"]) for row in own], [float(row["loss"]) for row in own],
+                  color=COLOURS[run], label=run)
         checked = [row for row in own if row["validation_loss"]]
-        axes.plot([int(row["iteration"]) for row in checked], [float(row["validation_loss"]) for row in checked], ":", color=COLOURS[run])
-    axes.set(xlabel="iteration", ylabel="mean square error of clean values", title="Loss at nano (dotted: validation members)")
+        axes.plot([int(row["iteration"]) for row in checked],
+                  [float(row["validation_loss"]) for row in checked], ":", color=COLOURS[run])
+    axes.set(xlabel="iteration", ylabel="mean square error of clean values",
+             title="Loss at nano (dotted: validation members)")
     axes.legend(fontsize=7)
 
 

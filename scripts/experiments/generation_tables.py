@@ -30,6 +30,11 @@ def copies(novelty):
     return " / ".join(f"{100 * share:.0f} %" for share in shares)
 
 
+def draws_of(part):
+    draws = part.get("draws")
+    return percents(draws["coverage_percent"], draws["one_nna_percent"]) if draws else ""
+
+
 def columns_of(row):
     part, train, novelty = row.get("held_out", {}), row.get("train", {}), row.get("novelty")
     draws, near = part.get("draws", {}), part.get("perceptual", {}).get(NETWORK, {})
@@ -44,8 +49,9 @@ def columns_of(row):
         text(row.get("highpass_ratio"), "{:.2f}"),
     ]
     if near:
-        cells.append(f"{value(near['mmd']):.2f}, " + percents(value(near["coverage_percent"]), value(near["one_nna_percent"])))
-        cells.append(percents(near["draws"]["coverage_percent"], near["draws"]["one_nna_percent"]) if "draws" in near else "")
+        cells.append(f"{value(near['mmd']):.2f}, " +
+                     percents(value(near["coverage_percent"]), value(near["one_nna_percent"])))
+        cells.append(draws_of(near))
     else:
         cells += ["", ""]
     cells.append(text(value(part.get("kid", {}).get(NETWORK)), "{:.2f}"))
@@ -63,13 +69,19 @@ def table(titles, rows):
 
 def main():
     report = json.loads((pathlib.Path(sys.argv[1]) / "generation.json").read_text())[sys.argv[2]]
-    titles = ["MMD to held out, PSNR", "COV", "1-NNA", "COV, 1-NNA of all draws", "1-NNA to training", "copies", "nearest member", "sharpness",
-              "MMD, COV, 1-NNA by the network", "COV, 1-NNA of all draws by it", "KID", "Frechet"]
+    titles = [
+        "MMD to held out, PSNR", "COV", "1-NNA", "COV, 1-NNA of all draws", "1-NNA to training",
+        "copies", "nearest member", "sharpness", "MMD, COV, 1-NNA by the network",
+        "COV, 1-NNA of all draws by it", "KID", "Frechet"
+    ]
     table(titles, [(row["name"], columns_of(row)) for row in report["rows"]])
-    against = [(row["name"], row["held_out_captures"]) for row in report["rows"] if "held_out_captures" in row]
-    table(["MMD to captures", "COV", "1-NNA", "COV, 1-NNA of all draws"],
-          [(name, [f"{value(part['mmd_psnr_db']):.1f} dB", f"{value(part['coverage_percent']):.0f} %", f"{value(part['one_nna_percent']):.0f} %",
-                   percents(part["draws"]["coverage_percent"], part["draws"]["one_nna_percent"]) if "draws" in part else ""]) for name, part in against])
+    against = [(row["name"], row["held_out_captures"]) for row in report["rows"]
+               if "held_out_captures" in row]
+    rows = [(name, [
+        f"{value(part['mmd_psnr_db']):.1f} dB", f"{value(part['coverage_percent']):.0f} %",
+        f"{value(part['one_nna_percent']):.0f} %", draws_of(part)
+    ]) for name, part in against]
+    table(["MMD to captures", "COV", "1-NNA", "COV, 1-NNA of all draws"], rows)
 
 
 if __name__ == "__main__":

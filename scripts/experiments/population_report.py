@@ -1,9 +1,11 @@
-"""Puts a population's figures together: FOLDER/members/*.json and FOLDER/report.json -> one object of docs/results/population.json.
+"""Puts a population's figures together: FOLDER/members/*.json and FOLDER/report.json -> one object
+of docs/results/population.json.
 
     population_report.py FOLDER NAME OUTPUT COMMAND
 
-FOLDER is a state folder of `figurine-train population`; its report.json is by `figurine-train evaluate members`. Nothing is computed here but means. Also
-writes FOLDER/worst.txt: the ten members with the lowest PSNR on held-out poses, worst first. Objects of other names in OUTPUT stay.
+FOLDER is a state folder of `figurine-train population`; its report.json is by `figurine-train
+evaluate members`. Nothing is computed here but means. Also writes FOLDER/worst.txt: the ten members
+with the lowest PSNR on held-out poses, worst first. Objects of other names in OUTPUT stay.
 """
 
 import datetime
@@ -41,11 +43,16 @@ def spread(rows):
     return {
         "psnr_view_db": describe([metric(r, "held_out_views", "psnr_db") for r in rows]),
         "psnr_pose_db": describe([metric(r, "held_out_poses", "psnr_db") for r in rows]),
-        "psnr_pose_interleaved_db": describe([metric(r, "held_out_poses_interleaved", "psnr_db") for r in rows]),
-        "psnr_pose_block_db": describe([metric(r, "held_out_poses_block", "psnr_db") for r in rows]),
+        "psnr_pose_interleaved_db": describe(
+            [metric(r, "held_out_poses_interleaved", "psnr_db") for r in rows]),
+        "psnr_pose_block_db": describe(
+            [metric(r, "held_out_poses_block", "psnr_db") for r in rows]),
         "head_psnr_db": describe([metric(r, "held_out_poses", "head_psnr_db") for r in rows]),
         "flat_psnr_db": describe([metric(r, "held_out_poses", "flat_psnr_db") for r in rows]),
-        "above_flat_db": describe([metric(r, "held_out_poses", "psnr_db") - metric(r, "held_out_poses", "flat_psnr_db") for r in rows]),
+        "above_flat_db": describe([
+            metric(r, "held_out_poses", "psnr_db") - metric(r, "held_out_poses", "flat_psnr_db")
+            for r in rows
+        ]),
         "highpass_ratio": describe([metric(r, "held_out_poses", "highpass_ratio") for r in rows]),
         "difference_psnr_db": describe([r["quality"]["difference_psnr_db"] for r in rows]),
     }
@@ -53,7 +60,8 @@ def spread(rows):
 
 def frozen_gain(rows):
     gains = [
-        metric(r, "held_out_poses", "psnr_db") - r["frozen_pose"]["held_out_poses"]["psnr_db"] for r in rows if "frozen_pose" in r
+        metric(r, "held_out_poses", "psnr_db") - r["frozen_pose"]["held_out_poses"]["psnr_db"]
+        for r in rows if "frozen_pose" in r
     ]
     return describe(gains)
 
@@ -74,23 +82,35 @@ def initial_weights(rows):
                 "from_scratch_db": statistics.fmean(b[2] for _, b in here),
             }
         )
-    gain = lambda group: describe([metric(r, group, "psnr_db") - r["from_scratch"]["quality"][group]["psnr_db"] for r in pairs])
-    return {"gain_views_db": gain("held_out_views"), "gain_poses_db": gain("held_out_poses"), "curve": curve}
+    gain = lambda group: describe([
+        metric(r, group, "psnr_db") - r["from_scratch"]["quality"][group]["psnr_db"] for r in pairs
+    ])
+    return {
+        "gain_views_db": gain("held_out_views"), "gain_poses_db": gain("held_out_poses"),
+        "curve": curve
+    }
 
 
 def rounding(rows):
-    losses = {f"{r['identity']} {g}": r["rounding"][g]["loss_db"] for r in rows if "rounding" in r for g in ("views", "poses")}
+    losses = {
+        f"{r['identity']} {g}": r["rounding"][g]["loss_db"] for r in rows if "rounding" in r
+        for g in ("views", "poses")
+    }
     return {"losses_db": losses, "worst_db": max(losses.values(), default=None)}
 
 
 def main():
-    folder, name, output, command = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), sys.argv[4]
+    folder, output = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[3])
+    name, command = sys.argv[2], sys.argv[4]
     rows = [json.loads(p.read_text()) for p in sorted((folder / "members").glob("*.json"))]
     if not rows:
         sys.exit(f"population_report.py: {folder}: has no members yet")
     report = read(folder / "report.json") or {}
-    report.get("distances", {}).pop("members", None)  # everybody's own neighbours stay in the folder: hundreds of rows
-    parts = {part: [r for r in rows if r["split"] == part] for part in ("train", "validation", "test")}
+    # Everybody's own neighbours stay in the folder: hundreds of rows.
+    report.get("distances", {}).pop("members", None)
+    parts = {
+        part: [r for r in rows if r["split"] == part] for part in ("train", "validation", "test")
+    }
     everybody = spread(rows)
     gain = frozen_gain(rows)
     worst = sorted(rows, key=lambda r: metric(r, "held_out_poses", "psnr_db"))[:10]
@@ -110,24 +130,22 @@ def main():
         "seconds": {
             "training_one_core": describe([r["train_seconds"] for r in rows]),
             "capture_cpu": describe([r["capture_cpu_seconds"] for r in rows]),
-            "note": "seconds_per_avatar: two people are trained side by side, each on one core, so one costs two cores half its time",
+            "note": "seconds_per_avatar: two people are trained side by side, each on one core, "
+                    "so one costs two cores half its time",
         },
         "all": everybody,
         "by_split": {part: spread(of_part) for part, of_part in parts.items() if of_part},
         "gain_over_frozen_pose": gain,
         "initial_weights": initial_weights(rows),
         "rounding": rounding(rows),
-        "worst_ten": [
-            {
-                "identity": r["identity"],
-                "split": r["split"],
-                "psnr_pose_db": metric(r, "held_out_poses", "psnr_db"),
-                "flat_psnr_db": metric(r, "held_out_poses", "flat_psnr_db"),
-                "garment": r["person"].get("garment"),
-                "hair": r["person"].get("hair"),
-            }
-            for r in worst
-        ],
+        "worst_ten": [{
+            "identity": r["identity"],
+            "split": r["split"],
+            "psnr_pose_db": metric(r, "held_out_poses", "psnr_db"),
+            "flat_psnr_db": metric(r, "held_out_poses", "flat_psnr_db"),
+            "garment": r["person"].get("garment"),
+            "hair": r["person"].get("hair"),
+        } for r in worst],
         "members_report": report or None,
         "command": command,
         "commit": os.environ.get("FIGURINE_COMMIT", "unknown"),
@@ -140,7 +158,9 @@ def main():
     temporary.write_text(json.dumps(content, indent=2) + "\n")
     temporary.replace(output)
     above = everybody["above_flat_db"]["mean"]
-    print(f"{name}: {len(rows)} members, held-out poses {result['psnr_pose_db_mean']:.2f} dB, {above:.2f} above flat, views {result['psnr_view_db_mean']:.2f} dB")
+    print(
+        f"{name}: {len(rows)} members, held-out poses {result['psnr_pose_db_mean']:.2f} dB, "
+        f"{above:.2f} above flat, views {result['psnr_view_db_mean']:.2f} dB")
 
 
 if __name__ == "__main__":

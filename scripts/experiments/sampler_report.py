@@ -1,9 +1,10 @@
-"""Puts a sampler's figures together: FOLDER/{generation,sampling,timed}.json, golden.txt and the runs' losses -> docs/results/generation.json,
-sampling.json and sampler_loss_NAME.csv.
+"""Puts a sampler's figures together: FOLDER/{generation,sampling,timed}.json, golden.txt and the
+runs' losses -> docs/results/generation.json, sampling.json and sampler_loss_NAME.csv.
 
     sampler_report.py FOLDER NAME OUTPUT COMMAND
 
-FOLDER is that of scripts/experiments/sampler.sh. Nothing is computed here. Objects of other names in generation.json stay.
+FOLDER is that of scripts/experiments/sampler.sh. Nothing is computed here. Objects of other names
+in generation.json stay.
 """
 
 import datetime
@@ -37,22 +38,28 @@ def same_on_all_cpus(golden, name):
     found = re.findall(pattern, golden, re.MULTILINE)
     cpus = [cpu if cpu == "host" else f"{cpu} (QEMU)" for cpu, _, _ in found]
     hashes = {weights for _, _, weights in found}
-    return {"cpus": cpus, "seeds": int(found[0][1]), "weights_of_seed_0": sorted(hashes), "same": len(hashes) == 1 and len(found) == golden.count("\n")}
+    return {
+        "cpus": cpus, "seeds": int(found[0][1]), "weights_of_seed_0": sorted(hashes),
+        "same": len(hashes) == 1 and len(found) == golden.count("\n")
+    }
 
 
 def keep_entropy(before, now):
-    """A package that says nothing of its posterior entropy has the one found when it was trained: it depends on settings and population alone."""
+    """A package that says nothing of its posterior entropy has the one found when it was trained:
+    it depends on settings and population alone."""
     if before.get("population_hash") != now["population_hash"]:
         return
     known = {run["name"]: run for run in before["runs"]}
     for run in now["runs"]:
         old = known.get(run["name"], {})
-        if "posterior_entropy" not in run and "posterior_entropy" in old and old["settings"] == run["settings"]:
+        missing = "posterior_entropy" not in run and "posterior_entropy" in old
+        if missing and old["settings"] == run["settings"]:
             run["posterior_entropy"] = old["posterior_entropy"]
 
 
 def main():
-    folder, name, output, command = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), sys.argv[4]
+    folder, output = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[3])
+    name, command = sys.argv[2], sys.argv[4]
     head = {
         "command": command,
         "commit": os.environ.get("FIGURINE_COMMIT", "unknown"),
@@ -64,10 +71,13 @@ def main():
     keep_entropy(before, generation[name])
     write(output / "generation.json", generation)
     losses_path = output / f"sampler_loss_{name}.csv"
-    losses_path.write_text(merged_losses(losses_path, folder, [run for run in ("basis", "layer") if (folder / run).exists()]))
+    runs = [run for run in ("basis", "layer") if (folder / run).exists()]
+    losses_path.write_text(merged_losses(losses_path, folder, runs))
 
     golden = folder / "golden.txt"
-    same = {"same_on_all_cpus": same_on_all_cpus(golden.read_text(), name)} if golden.exists() else {}
+    same = {}
+    if golden.exists():
+        same = {"same_on_all_cpus": same_on_all_cpus(golden.read_text(), name)}
     measured, timed = read(folder / "sampling.json"), read(folder / "timed.json")
     if measured is None:  # the package that ships: its figures stay those of when it was made
         write(output / "sampling.json", read(output / "sampling.json") | same)

@@ -1,8 +1,10 @@
-"""Puts an ablation's figures together: FOLDER/generation.json and the runs' losses -> docs/results/generation.json and sampler_loss_NAME.csv.
+"""Puts an ablation's figures together: FOLDER/generation.json and the runs' losses ->
+docs/results/generation.json and sampler_loss_NAME.csv.
 
     variants_report.py FOLDER NAME OUTPUT COMMAND RUN...
 
-FOLDER is that of scripts/experiments/variants.sh. Nothing is computed here. Objects of other names in generation.json stay.
+FOLDER is that of scripts/experiments/variants.sh. Nothing is computed here. Objects of other names
+in generation.json stay.
 """
 
 import csv
@@ -28,19 +30,22 @@ def losses(folder, runs):
         with open(folder / run / "log.csv", encoding="utf-8") as log:
             for row in csv.DictReader(log):
                 if int(row["iteration"]) % STEP == 0:
-                    lines.append(f"{run},{row['iteration']},{float(row['seconds']):.0f},{row['loss']},{row['validation_loss']}")
+                    lines.append(f"{run},{row['iteration']},{float(row['seconds']):.0f},"
+                                 f"{row['loss']},{row['validation_loss']}")
     return "\n".join(lines) + "\n"
 
 
 def merged_losses(path, folder, runs):
     """Those of the runs, and what the file has of others."""
-    kept = [line for line in path.read_text().splitlines()[1:] if line.split(",")[0] not in runs] if path.exists() else []
+    earlier = path.read_text().splitlines()[1:] if path.exists() else []
+    kept = [line for line in earlier if line.split(",")[0] not in runs]
     head, *rows = losses(folder, runs).splitlines()
     return "\n".join([head, *rows, *kept]) + "\n"
 
 
 def keep_others(before, now):
-    """Rows of trainings that were not judged this time, with the commit and date that they are from, if they are of the same population."""
+    """Rows of trainings that were not judged this time, with the commit and date that they are
+    from, if they are of the same population."""
     if before.get("population_hash") != now["population_hash"]:
         return
     trained = {run["name"] for run in now["runs"]}
@@ -54,7 +59,8 @@ def keep_others(before, now):
 
 
 def main():
-    folder, name, output, command, runs = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3]), sys.argv[4], sys.argv[5:]
+    folder, output = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[3])
+    name, command, runs = sys.argv[2], sys.argv[4], sys.argv[5:]
     report = json.loads((folder / "generation.json").read_text())
     del report["command"]  # of this machine's folders
     path = output / "generation.json"
