@@ -1,13 +1,18 @@
 #!/usr/bin/env bash
-# The whole line with figures: body, capture, training rows, packing, parity; writes docs/results/line.json and the contact sheet beside it.
+# The whole line with figures: body, capture, training rows, packing, parity; writes
+# docs/results/line.json and the contact sheet beside it.
 #
-#   scripts/experiments/line.sh [FOLDER]        FOLDER (default out/line) keeps every step: run it again and it goes on where it stopped
+#   scripts/experiments/line.sh [FOLDER]
 #
-# The shipped avatar trains for ten minutes on two quiet cores; all other rows train for iterations, which a busy machine cannot change. The pair
-# with and without the body pose takes eleven minutes on one core each.
+# FOLDER (default out/line) keeps every step: run it again and it goes on where it stopped.
 #
-# Environment: ITERATIONS (1500) of the rows that name no number of their own, SEED (1) of the person and
-# ROWS (all), a list of row names to limit training to. On two quiet cores it takes about 50 minutes by estimate.
+# The shipped avatar trains for ten minutes on two quiet cores; all other rows train for iterations,
+# which a busy machine cannot change. The pair with and without the body pose takes eleven minutes
+# on one core each.
+#
+# Environment: ITERATIONS (1500) of the rows that name no number of their own, SEED (1) of the
+# person and ROWS (all), a list of row names to limit training to. On two quiet cores it takes about
+# 50 minutes by estimate.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
@@ -53,7 +58,9 @@ if [ -e "$folder/runs/shipped/evaluation.json" ]; then
   step "packing"
   train pack "$folder/runs/shipped" --precision f32,q8 --golden -o "$folder/avatar.fgn"
   step "parity"
-  train evaluate parity --run "$folder/runs/shipped" --package "$folder/avatar.fgn" -o "$folder/parity.json"
+  train evaluate parity --run "$folder/runs/shipped" --package "$folder/avatar.fgn" \
+    -o "$folder/parity.json"
 fi
 step "docs/results/line.json"
-scripts/run python3 scripts/experiments/line_report.py "$folder" docs/results/line.json "scripts/experiments/line.sh"
+scripts/run python3 scripts/experiments/line_report.py "$folder" docs/results/line.json \
+  "scripts/experiments/line.sh"

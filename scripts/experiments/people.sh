@@ -1,6 +1,8 @@
-# Sourced by line.sh and quantization.sh, in the checkout and with $folder set: tools.sh, the body, the motions, a person's capture.
+# Sourced by line.sh and quantization.sh, in the checkout and with $folder set: tools.sh, the body,
+# the motions, a person's capture.
 #
-# People walk (four walks and an endless one from CMU 01_03) and jump (01_01), turned through 360 degrees. What is in $folder already stays.
+# People walk (four walks and an endless one from CMU 01_03) and jump (01_01), turned through 360
+# degrees. What is in $folder already stays.
 
 . scripts/experiments/tools.sh
 mkdir -p "$folder/runs"
@@ -10,7 +12,9 @@ body=$folder/body.fgn
 
 motions=()
 motion() {  # NAME CLIP OPTIONS...
-  [ -e "$folder/$1.fgn" ] || train motion "/usr/share/assimp/models/BVH/$2" --body "$body" --name "$1" -o "$folder/$1.fgn" "${@:3}"
+  [ -e "$folder/$1.fgn" ] ||
+    train motion "/usr/share/assimp/models/BVH/$2" --body "$body" --name "$1" \
+      -o "$folder/$1.fgn" "${@:3}"
   motions+=(--motion "$folder/$1.fgn")
 }
 step "motions"
@@ -24,7 +28,8 @@ motion jump 01_01.bvh --frames 180
 capture_person() {  # FOLDER SEED: leaves the folder of the person's images in $identity
   [ -e "$1/.done" ] || {
     step "capture of person $2"
-    train capture --body "$body" --identities 1 --seed "$2" --frames 119 "${motions[@]}" --resume -o "$1"
+    train capture --body "$body" --identities 1 --seed "$2" --frames 119 "${motions[@]}" --resume \
+      -o "$1"
     touch "$1/.done"
   }
   identity=$1/$(cd "$1" && ls -d */ | head -n 1 | tr -d /)

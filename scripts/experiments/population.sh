@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# A whole population and its figures: makes (or goes on with) the people of a recipe, packs them, looks at them, writes docs/results/population.json.
+# A whole population and its figures: makes (or goes on with) the people of a recipe, packs them,
+# looks at them, writes docs/results/population.json.
 #
-#   scripts/experiments/population.sh edge|nano [FOLDER]        FOLDER (default out/population) keeps every step
+#   scripts/experiments/population.sh edge|nano [FOLDER]   FOLDER (default out/population) keeps all
 #
-# May be stopped and killed at any time; called again it goes on. MINUTES limits how long new people are begun. On two quiet cores `edge` takes about
-# two hours and `nano` one, by estimate.
+# May be stopped and killed at any time; called again it goes on. MINUTES limits how long new people
+# are begun. On two quiet cores `edge` takes about two hours and `nano` one, by estimate.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
@@ -14,13 +15,20 @@ name=${1:?edge or nano} folder=${2:-out/population}
 
 state=$folder/$name
 train population "toolchain/population/$name.json" ${MINUTES:+--stop-after "$MINUTES"} -o "$state"
-train evaluate members "$state/population.fgn" --body "$state/body.fgn" --wall "docs/population_$name.jpg" \
+train evaluate members "$state/population.fgn" --body "$state/body.fgn" \
+  --wall "docs/population_$name.jpg" \
   --interpolation "docs/interpolation_$name.jpg" -o "$state/report.json"
-scripts/run python3 scripts/experiments/population_report.py "$state" "$name" docs/results/population.json "scripts/experiments/population.sh $name"
+scripts/run python3 scripts/experiments/population_report.py "$state" "$name" \
+  docs/results/population.json "scripts/experiments/population.sh $name"
 # The ten worst on held-out poses, worst first: truth left, avatar right in every pair.
 worst=()
 while read -r identity; do worst+=(-i "$state/members/$identity.jpg"); done < "$state/worst.txt"
-scripts/run ffmpeg -v error -y "${worst[@]}" -filter_complex \
-  "$(for k in $(seq 0 9); do printf '[%d]scale=480:320:force_original_aspect_ratio=decrease,pad=480:320:0:0:0x808080,setsar=1[t%d];' "$k" "$k"; done)$(printf '[t%d]' $(seq 0 9))xstack=inputs=10:layout=$(
-    for k in $(seq 0 9); do printf '%d_%d%s' $((k % 2 * 480)) $((k / 2 * 320)) "$([ "$k" = 9 ] || printf '|')"; done)" \
+fit=scale=480:320:force_original_aspect_ratio=decrease,pad=480:320:0:0:0x808080,setsar=1
+filters="" tiles="" layout=""
+for k in $(seq 0 9); do
+  filters+="[$k]$fit[t$k];" tiles+="[t$k]"
+  layout+="${layout:+|}$((k % 2 * 480))_$((k / 2 * 320))"
+done
+scripts/run ffmpeg -v error -y "${worst[@]}" \
+  -filter_complex "$filters${tiles}xstack=inputs=10:layout=$layout" \
   -q:v 4 "docs/population_worst_$name.jpg"

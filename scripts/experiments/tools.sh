@@ -1,12 +1,19 @@
-# Sourced by the scripts of this folder, in the checkout and with $folder, which keeps every step: the toolchain built (and the programs in
-# the array $programs), `train` and `device` to call it, the commit that reports name.
+# Sourced by the scripts of this folder, in the checkout and with $folder, which keeps every step:
+# the toolchain built (and the programs in the array $programs), `train` and `device` to call it,
+# the commit that reports name.
 
 build=build/dev
 started=$SECONDS
 step() { say "$(basename "$0" .sh): $((SECONDS - started)) s: $*"; }
 train() { scripts/run "$build/toolchain/cli/figurine-train" "$@"; }
 device() { scripts/run "$build/samples/figurine/figurine" "$@"; }
-export FIGURINE_COMMIT=${FIGURINE_COMMIT:-$(git rev-parse HEAD 2> /dev/null || echo unknown)$(git diff --quiet HEAD -- 2> /dev/null || echo +changes)}
+commit_here() {
+  local commit changes
+  commit=$(git rev-parse HEAD 2> /dev/null || echo unknown)
+  changes=$(git diff --quiet HEAD -- 2> /dev/null || echo +changes)
+  echo "$commit$changes"
+}
+export FIGURINE_COMMIT=${FIGURINE_COMMIT:-$(commit_here)}
 
 scripts/setup toolchain
 step "building"
@@ -14,7 +21,8 @@ scripts/run cmake --preset dev > /dev/null
 scripts/run cmake --build --preset dev --target figurine-train "${programs[@]}" > /dev/null
 mkdir -p "$folder" docs/results
 
-# Trains the sampler RUN by the options, or goes on with it; a finished one is left alone. Needs $population.
+# Trains the sampler RUN by the options, or goes on with it; a finished one is left alone. Needs
+# $population.
 learn() {
   local run=$1
   shift
