@@ -154,7 +154,7 @@ void PosedAvatar::decode(uint32_t begin, uint32_t end, GaussianArrays& gaussians
   const float limit = decoding_.max_log_scale;
   for (size_t i = begin; i < end; ++i) {
     const float* h = head(i);
-    for (int k = 0; k < 3; ++k)
+    for (uint32_t k = 0; k < 3; ++k)
       gaussians.position_m[3 * i + k] =
           texel_position_m_[3 * i + k] + decoding_.offset_scale_m * h[k];
 
@@ -162,11 +162,11 @@ void PosedAvatar::decode(uint32_t begin, uint32_t end, GaussianArrays& gaussians
     const std::array<float, 9> rotation = rotation_from_quaternion(quaternion);
     const float spacing = decoding_.spacing_scale * body_.texel_spacing_m[i];
     float scale[3];
-    for (int k = 0; k < 3; ++k)
+    for (uint32_t k = 0; k < 3; ++k)
       scale[k] =
           spacing * exp_float(h[3 + k] < -limit ? -limit : (h[3 + k] > limit ? limit : h[3 + k]));
-    for (int r = 0; r < 3; ++r) {
-      for (int k = 0; k < 3; ++k)
+    for (uint32_t r = 0; r < 3; ++r) {
+      for (uint32_t k = 0; k < 3; ++k)
         gaussians.covariance_factor[9 * i + 3 * r + k] = rotation[3 * r + k] * scale[k];
     }
     gaussians.opacity[i] = logistic(h[10] + decoding_.opacity_bias);

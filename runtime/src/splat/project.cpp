@@ -25,7 +25,7 @@ ViewParameters make_view_parameters(const Camera& camera, float alpha_cut) {
   ViewParameters view;
   view.view_from_world = camera.view_from_world;
   const std::array<float, 12>& m = camera.view_from_world;
-  for (int k = 0; k < 3; ++k) {
+  for (size_t k = 0; k < 3; ++k) {
     const double centre =
         -(double(m[k]) * m[3] + double(m[4 + k]) * m[7] + double(m[8 + k]) * m[11]);
     view.camera_centre_m[k] = static_cast<float>(centre);
@@ -79,7 +79,7 @@ bool evaluate_colour(const float* sh, uint32_t degree, const std::array<float, 3
   }
   float sum[3] = {0, 0, 0};
   for (uint32_t k = 0; k < sh_coefficients(degree); ++k) {
-    for (int c = 0; c < 3; ++c) sum[c] += basis[k] * sh[3 * k + c];
+    for (uint32_t c = 0; c < 3; ++c) sum[c] += basis[k] * sh[3 * k + c];
   }
   for (int c = 0; c < 3; ++c) {
     if (!finite(sum[c])) return false;
@@ -149,7 +149,7 @@ bool project_gaussian(const ViewParameters& view, const GaussianView& gaussians,
     return false;
 
   std::array<float, 3> direction;
-  for (int k = 0; k < 3; ++k) direction[k] = position[k] - view.camera_centre_m[k];
+  for (size_t k = 0; k < 3; ++k) direction[k] = position[k] - view.camera_centre_m[k];
   const float inverse_length = 1.0f / std::sqrt(dot(direction.data(), direction.data()));
   for (float& component : direction) component *= inverse_length;
   float rgb[3];
