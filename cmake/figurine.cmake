@@ -26,6 +26,15 @@ if(FIGURINE_SANITIZE)
   add_link_options(-fsanitize=${FIGURINE_SANITIZE})
 endif()
 
+# figurine_guard(TARGET...): what runs on devices says every conversion that may lose a value, and has no
+# warning. Errors only where we build it ourselves: another compiler's new warning is not a user's problem.
+function(figurine_guard)
+  foreach(target ${ARGN})
+    target_compile_options(${target} PRIVATE -Wconversion)
+    set_target_properties(${target} PROPERTIES COMPILE_WARNING_AS_ERROR ${FIGURINE_WERROR})
+  endforeach()
+endfunction()
+
 # figurine_program(VARIABLE TARGET): what a test calls to run the built program: its path or, in a cross build, that of a script with the emulator in front.
 function(figurine_program variable target)
   if(NOT CMAKE_CROSSCOMPILING)

@@ -33,6 +33,7 @@ target_link_libraries(figurine_writer PUBLIC figurine_formats)
 target_include_directories(figurine_writer PUBLIC "${PROJECT_SOURCE_DIR}")
 target_include_directories(figurine_writer SYSTEM PRIVATE "${CMAKE_CURRENT_BINARY_DIR}/schema")
 target_compile_options(figurine_writer PRIVATE -fno-exceptions)
+figurine_guard(figurine_formats figurine_writer)
 
 # Needs figurine_ports_files (ports/linux), which is configured after this folder: targets are linked by name.
 find_package(CLI11 REQUIRED)

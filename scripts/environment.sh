@@ -1,7 +1,8 @@
 # Sourced by setup and run: decides where commands run. Not executable by itself.
 #
-# The reference platform is Debian 13 (docs/decisions/0001-platform.md). On a host that is at least that new, commands run on the host. On an older
-# Debian they run in a Debian 13 root below the user's cache, shared by all checkouts and built once by scripts/setup.
+# The reference platform is Debian 13 (docs/decisions/0001-platform.md). On a host that is at least
+# that new, commands run on the host. On an older Debian they run in a Debian 13 root below the
+# user's cache, shared by all checkouts and built once by scripts/setup.
 
 figurine_checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 figurine_cache=${FIGURINE_CACHE:-${XDG_CACHE_HOME:-${HOME:-/root}/.cache}/figurine}

@@ -42,7 +42,7 @@ void draw_pose_maps(const Body& body, const PoseView& pose, const MapStatistics&
     const std::array<float, 3> normal =
         transform_normal(transform, &body.texel_normal[size_t(i) * 3]);
     float* out = &maps[size_t(body.texel[i]) * stride];
-    for (int k = 0; k < 3; ++k) {
+    for (size_t k = 0; k < 3; ++k) {
       out[k] = ((position[k] - root[k]) - statistics.mean[k]) * statistics.scale[k];
       out[3 + k] = (normal[k] - statistics.mean[3 + k]) * statistics.scale[3 + k];
     }

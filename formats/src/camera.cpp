@@ -14,10 +14,10 @@ Status invalid(const char* what) {
 }
 
 bool is_rotation(const std::array<float, 12>& m) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = i; j < 3; ++j) {
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = i; j < 3; ++j) {
       double dot = 0;
-      for (int k = 0; k < 3; ++k) dot += double(m[4 * i + k]) * m[4 * j + k];
+      for (size_t k = 0; k < 3; ++k) dot += double(m[4 * i + k]) * m[4 * j + k];
       if (!(std::abs(dot - (i == j ? 1.0 : 0.0)) <= 1e-3)) return false;
     }
   }
@@ -72,12 +72,12 @@ Result<Camera> make_orbit_camera(const OrbitCamera& orbit, uint32_t width_px, ui
   camera.fy_px =
       static_cast<float>(0.5 * height_px / std::tan(0.5 * orbit.vertical_fov_deg * kPi / 180));
   camera.fx_px = camera.fy_px;
-  camera.cx_px = 0.5f * width_px;
-  camera.cy_px = 0.5f * height_px;
+  camera.cx_px = 0.5f * static_cast<float>(width_px);
+  camera.cy_px = 0.5f * static_cast<float>(height_px);
   const double* rows[3] = {right, down, forward};
-  for (int i = 0; i < 3; ++i) {
+  for (size_t i = 0; i < 3; ++i) {
     double translation = 0;
-    for (int k = 0; k < 3; ++k) {
+    for (size_t k = 0; k < 3; ++k) {
       const double centre = orbit.target_m[k] + orbit.distance_m * from_target[k];
       camera.view_from_world[4 * i + k] = static_cast<float>(rows[i][k]);
       translation -= rows[i][k] * centre;

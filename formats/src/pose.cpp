@@ -8,8 +8,8 @@ namespace {
 
 std::array<float, 9> multiply(const std::array<float, 9>& a, const std::array<float, 9>& b) {
   std::array<float, 9> product;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j)
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = 0; j < 3; ++j)
       product[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
   }
   return product;
@@ -34,7 +34,7 @@ Status validate_pose(const PoseView& pose, uint32_t joint_count) {
   }
   for (uint32_t j = 0; j < joint_count; ++j) {
     double length2 = 0;
-    for (int k = 0; k < 4; ++k)
+    for (uint32_t k = 0; k < 4; ++k)
       length2 += double(pose.rotations[4 * j + k]) * pose.rotations[4 * j + k];
     if (!(length2 >= 1e-12) || !(length2 < 1e30)) {
       return Status(StatusCode::kInvalidArgument,
@@ -64,7 +64,7 @@ std::array<float, 9> rotation_from_quaternion(const float* wxyz) {
 
 std::array<float, 3> root_position(const SkeletonView& skeleton, const PoseView& pose) {
   std::array<float, 3> position;
-  for (int k = 0; k < 3; ++k)
+  for (size_t k = 0; k < 3; ++k)
     position[k] = skeleton.rest_position_m[k] + pose.root_translation_m[k];
   return position;
 }
@@ -85,14 +85,14 @@ void skinning_transforms(const SkeletonView& skeleton, const PoseView& pose,
       const std::array<float, 9> parent_rotation{p[0], p[1], p[2], p[4], p[5],
                                                  p[6], p[8], p[9], p[10]};
       std::array<float, 3> bone;
-      for (int k = 0; k < 3; ++k)
+      for (size_t k = 0; k < 3; ++k)
         bone[k] = skeleton.rest_position_m[3 * j + k] - skeleton.rest_position_m[3 * parent + k];
       rotation = multiply(parent_rotation, local);
       position = multiply(parent_rotation, bone);
-      for (int k = 0; k < 3; ++k) position[k] = p[4 * k + 3] + position[k];
+      for (size_t k = 0; k < 3; ++k) position[k] = p[4 * k + 3] + position[k];
     }
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) world_from_rest[j].m[4 * i + k] = rotation[3 * i + k];
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t k = 0; k < 3; ++k) world_from_rest[j].m[4 * i + k] = rotation[3 * i + k];
       world_from_rest[j].m[4 * i + 3] = position[i];
     }
   }
@@ -100,7 +100,7 @@ void skinning_transforms(const SkeletonView& skeleton, const PoseView& pose,
   for (size_t j = 0; j < skeleton.parents.size(); ++j) {
     std::array<float, 12>& m = world_from_rest[j].m;
     const float* rest = &skeleton.rest_position_m[3 * j];
-    for (int i = 0; i < 3; ++i)
+    for (size_t i = 0; i < 3; ++i)
       m[4 * i + 3] -= m[4 * i] * rest[0] + m[4 * i + 1] * rest[1] + m[4 * i + 2] * rest[2];
   }
 }
@@ -111,14 +111,14 @@ Affine blend(std::span<const Affine> world_from_rest, const uint8_t* joints, con
   for (uint32_t k = 0; k < kSkinInfluences; ++k) {
     if (weights[k] == 0) continue;
     const std::array<float, 12>& m = world_from_rest[joints[k]].m;
-    for (int i = 0; i < 12; ++i) sum.m[i] += weights[k] * m[i];
+    for (size_t i = 0; i < 12; ++i) sum.m[i] += weights[k] * m[i];
   }
   return sum;
 }
 
 std::array<float, 3> transform_point(const Affine& transform, const float* point) {
   std::array<float, 3> result;
-  for (int i = 0; i < 3; ++i) {
+  for (size_t i = 0; i < 3; ++i) {
     const float* row = &transform.m[4 * i];
     result[i] = (row[0] * point[0] + row[1] * point[1]) + (row[2] * point[2] + row[3]);
   }
@@ -137,7 +137,7 @@ std::array<float, 3> transform_normal(const Affine& transform, const float* norm
   const float sign = determinant < 0 ? -1.0f : 1.0f;
   std::array<float, 3> result;
   float length2 = 0;
-  for (int i = 0; i < 3; ++i) {
+  for (size_t i = 0; i < 3; ++i) {
     result[i] = sign * (cofactor[3 * i] * normal[0] + cofactor[3 * i + 1] * normal[1] +
                         cofactor[3 * i + 2] * normal[2]);
     length2 += result[i] * result[i];

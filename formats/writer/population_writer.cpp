@@ -165,8 +165,7 @@ void add_factor(std::span<const float> matrix, size_t n, std::vector<Half>& out)
   }
 }
 
-// ---- Provenance: what all members have is said once
-// ------------------------------------------------------------------------------------
+// ---- Provenance: what all members have is said once ---------------------------------------------
 
 // Removes from every member what all have, and returns that.
 Provenance factor_out(std::vector<Provenance>& own) {

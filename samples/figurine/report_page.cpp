@@ -13,34 +13,46 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kStyle = R"css(
-:root { --paper: #fbfbf9; --ink: #1d2125; --soft: #667079; --line: #dcdfe1; --card: #ffffff; --accent: #b5432a; --blue: #2b6a99; }
+:root { --paper: #fbfbf9; --ink: #1d2125; --soft: #667079; --line: #dcdfe1; --card: #ffffff;
+        --accent: #b5432a; --blue: #2b6a99; }
 @media (prefers-color-scheme: dark) {
-  :root { --paper: #16181b; --ink: #e8e9ea; --soft: #98a1a9; --line: #33383d; --card: #1d2024; --accent: #f08a6b; --blue: #7db9e3; }
+  :root { --paper: #16181b; --ink: #e8e9ea; --soft: #98a1a9; --line: #33383d; --card: #1d2024;
+          --accent: #f08a6b; --blue: #7db9e3; }
 }
 * { box-sizing: border-box; }
-body { margin: 0 auto; max-width: 1180px; padding: 40px 28px 64px; background: var(--paper); color: var(--ink);
+body { margin: 0 auto; max-width: 1180px; padding: 40px 28px 64px; background: var(--paper);
+       color: var(--ink);
        font: 15px/1.55 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 h1 { font-size: 26px; font-weight: 650; margin: 0 0 4px; letter-spacing: -0.01em; }
 h2 { font-size: 18px; font-weight: 650; margin: 44px 0 6px; }
 p { max-width: 78ch; margin: 6px 0 14px; }
 .soft, .facts dt { color: var(--soft); }
-.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(190px, 1fr)); gap: 14px 28px; margin: 22px 0 8px; padding: 16px 20px;
+.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(190px, 1fr));
+         gap: 14px 28px; margin: 22px 0 8px; padding: 16px 20px;
          background: var(--card); border: 1px solid var(--line); border-radius: 8px; }
-.facts dt { font-size: 12.5px; } .facts dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
+.facts dt { font-size: 12.5px; }
+.facts dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(430px, 1fr)); gap: 18px; }
 .words { padding: 18px 8px; align-self: center; }
-figure { margin: 0; padding: 14px 14px 8px; background: var(--card); border: 1px solid var(--line); border-radius: 8px; }
+figure { margin: 0; padding: 14px 14px 8px; background: var(--card);
+         border: 1px solid var(--line); border-radius: 8px; }
 figcaption { font-size: 13px; color: var(--soft); padding: 4px 4px 6px; }
 svg { width: 100%; height: auto; display: block; font-family: inherit; }
 svg .grid { stroke: var(--line); stroke-width: 1; }
 svg .tick { fill: var(--soft); font-size: 12px; } svg .axis { fill: var(--ink); font-size: 13px; }
 svg .curve { fill: none; stroke: var(--blue); stroke-width: 1.6; opacity: 0.55; }
-svg .point { fill: var(--blue); } svg .default { fill: var(--accent); stroke: var(--card); stroke-width: 1.5; }
-svg .label { fill: var(--ink); font-size: 12px; } svg .strong { fill: var(--accent); font-weight: 650; }
-svg .theory { stroke: var(--soft); stroke-width: 1.3; stroke-dasharray: 5 4; } svg .note { fill: var(--soft); font-size: 12px; }
-table { border-collapse: collapse; width: 100%; margin: 18px 0; font-variant-numeric: tabular-nums; }
-th { text-align: right; font-weight: 600; font-size: 13px; color: var(--soft); border-bottom: 1.5px solid var(--line); padding: 6px 10px; }
-td { text-align: right; border-bottom: 1px solid var(--line); padding: 6px 10px; } th:first-child, td:first-child { text-align: left; }
+svg .point { fill: var(--blue); }
+svg .default { fill: var(--accent); stroke: var(--card); stroke-width: 1.5; }
+svg .label { fill: var(--ink); font-size: 12px; }
+svg .strong { fill: var(--accent); font-weight: 650; }
+svg .theory { stroke: var(--soft); stroke-width: 1.3; stroke-dasharray: 5 4; }
+svg .note { fill: var(--soft); font-size: 12px; }
+table { border-collapse: collapse; width: 100%; margin: 18px 0;
+        font-variant-numeric: tabular-nums; }
+th { text-align: right; font-weight: 600; font-size: 13px; color: var(--soft);
+     border-bottom: 1.5px solid var(--line); padding: 6px 10px; }
+td { text-align: right; border-bottom: 1px solid var(--line); padding: 6px 10px; }
+th:first-child, td:first-child { text-align: left; }
 tr.default td { color: var(--accent); font-weight: 600; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(200px, 1fr)); gap: 18px; }
 .pictures img { width: 100%; display: block; border-radius: 4px; }

@@ -238,8 +238,7 @@ TEST_P(PackageOpen, RejectsMisalignedMemory) {
   }
 }
 
-// ---- The blob list
-// -------------------------------------------------------------------------------------------------------------------------------
+// ---- The blob list ------------------------------------------------------------------------------
 
 Status open_parts(const std::function<void(PackageParts&)>& bend) {
   const MotionSample sample;

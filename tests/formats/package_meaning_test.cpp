@@ -48,8 +48,7 @@ Status bent_motion(const std::function<void(MotionSample&)>& bend) {
   return bent<MotionSample>(bend);
 }
 
-// ---- Body
-// ----------------------------------------------------------------------------------------------------------------------------------------
+// ---- Body ---------------------------------------------------------------------------------------
 
 TEST(PackageBody, RejectsCyclicAndForwardParents) {
   expect_refused(bent_body([](BodySample& s) {
@@ -157,8 +156,7 @@ TEST(PackageBody, RejectsAWrongNumberOfShapeCoefficients) {
                  "body.joint_shape_basis", StatusCode::kLimitExceeded);
 }
 
-// ---- Avatar
-// --------------------------------------------------------------------------------------------------------------------------------------
+// ---- Avatar -------------------------------------------------------------------------------------
 
 TEST(PackageAvatar, RejectsWeightsThatAreNotFinite) {
   for (float value : {kNan, kInfinity, -kInfinity}) {
@@ -433,8 +431,7 @@ TEST(PackageAvatar, RejectsGoldenFramesThatCannotBeDrawn) {
                  "golden.png: does not have the golden camera's size");
 }
 
-// ---- Motion
-// --------------------------------------------------------------------------------------------------------------------------------------
+// ---- Motion -------------------------------------------------------------------------------------
 
 TEST(PackageMotion, RejectsPosesThatAreNone) {
   for (float value : {kNan, kInfinity, 0.0f, 1.01f}) {
@@ -455,8 +452,7 @@ TEST(PackageMotion, RejectsPosesThatAreNone) {
                  "motion.root_translation: is missing");
 }
 
-// ---- Words
-// ---------------------------------------------------------------------------------------------------------------------------------------
+// ---- Words --------------------------------------------------------------------------------------
 
 TEST(PackageProvenance, RejectsFiguresThatAreNotFiniteAndTextThatIsNone) {
   const auto with = [](const std::function<void(Provenance&)>& bend) {
@@ -531,8 +527,7 @@ TEST(PackageIndex, RejectsUnknownConventions) {
   EXPECT_EQ(longest, 5u);
 }
 
-// ---- The writer's own refusals
-// -------------------------------------------------------------------------------------------------------------------
+// ---- The writer's own refusals ------------------------------------------------------------------
 
 TEST(PackageWriter, RejectsArraysWhoseLengthFitsNoShape) {
   constexpr StatusCode kInvalid = StatusCode::kInvalidArgument;
@@ -563,8 +558,7 @@ TEST(PackageWriter, RejectsArraysWhoseLengthFitsNoShape) {
                  kInvalid);
 }
 
-// ---- What belongs together
-// -----------------------------------------------------------------------------------------------------------------------
+// ---- What belongs together ----------------------------------------------------------------------
 
 TEST(PackageFit, AvatarsNameTheirBody) {
   const BodySample body_sample;

@@ -25,8 +25,7 @@ using samples::SamplerSample;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// ---- Round trip
-// ------------------------------------------------------------------------------------------------------------------------
+// ---- Round trip ---------------------------------------------------------------------------------
 
 TEST(SamplerRoundTrip, KeepsWhatItsAvatarsShare) {
   const SamplerSample sample;
@@ -134,8 +133,7 @@ TEST(SamplerRoundTrip, SameInputGivesSameBytes) {
   EXPECT_EQ(*SamplerSample().write(), *SamplerSample().write());
 }
 
-// ---- Hash of weights
-// -------------------------------------------------------------------------------------------------------------------
+// ---- Hash of weights ----------------------------------------------------------------------------
 
 struct HashedWeights {
   std::vector<int8_t> first_weights = {1, 2, 3, 4}, second_weights = {5, 6};
@@ -204,8 +202,7 @@ TEST(HashWeights, IsOneHashOfAllBytesInTheirOrder) {
   EXPECT_EQ(format_hash(weights.hash()), "0ba82d4283e7ebed844adfb576265c1f");
 }
 
-// ---- The writer
-// ------------------------------------------------------------------------------------------------------------------------
+// ---- The writer ---------------------------------------------------------------------------------
 
 void expect_refused(const Status& status, const std::string& words,
                     StatusCode code = StatusCode::kCorrupt) {
@@ -254,8 +251,7 @@ TEST(SamplerWriter, RejectsArraysThatFitNoShape) {
           [](Sampler& s) { s.golden.rotations = s.golden.rotations.first(11); });
 }
 
-// ---- Numbers that cannot be true
-// -------------------------------------------------------------------------------------------------------
+// ---- Numbers that cannot be true ----------------------------------------------------------------
 
 // The status of a sampler after something was done to the parts that it is assembled from.
 Status bent_parts(const std::function<void(PackageParts&, Sampler&)>& bend) {

@@ -31,8 +31,7 @@ using samples::same;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// ---- Halves
-// ----------------------------------------------------------------------------------------------------------------------------
+// ---- Halves -------------------------------------------------------------------------------------
 
 TEST(Half, EveryOneComesBackThroughFloat) {
   for (uint32_t bits = 0; bits < 65536; ++bits) {
@@ -67,8 +66,7 @@ TEST(Half, RoundsToNearestTiesToEven) {
   }
 }
 
-// ---- Entropy coding
-// --------------------------------------------------------------------------------------------------------------------
+// ---- Entropy coding -----------------------------------------------------------------------------
 
 std::vector<int8_t> decode(std::span<const uint8_t> stream, const RansTable& table, size_t count) {
   RansDecoder decoder(stream);
@@ -173,8 +171,7 @@ TEST(Rans, FrequenciesKeepEveryValueAndTheirSum) {
   EXPECT_EQ(sum, int(kRansTotal));
 }
 
-// ---- Round trips
-// -----------------------------------------------------------------------------------------------------------------------
+// ---- Round trips --------------------------------------------------------------------------------
 
 TEST(PopulationRoundTrip, MembersKeepWhatIsNotRounded) {
   for (const DifferenceCoding coding : {DifferenceCoding::kInt8, DifferenceCoding::kHalf}) {
@@ -328,8 +325,7 @@ TEST(PopulationMembers, AreFoundByNameThenByNumber) {
   }
 }
 
-// ---- Members that do not belong together
-// -----------------------------------------------------------------------------------------------
+// ---- Members that do not belong together --------------------------------------------------------
 
 void expect_refused(const Status& status, const std::string& words,
                     StatusCode code = StatusCode::kCorrupt) {
@@ -387,8 +383,7 @@ TEST(PopulationWriter, CanBeInterrupted) {
   EXPECT_EQ(calls, 2u);
 }
 
-// ---- Numbers that cannot be true
-// -------------------------------------------------------------------------------------------------------
+// ---- Numbers that cannot be true ----------------------------------------------------------------
 
 // The status of a population after something was done to the parts that it is assembled from.
 Status bent_parts(

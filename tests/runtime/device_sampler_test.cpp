@@ -22,8 +22,7 @@ namespace {
 
 using tests::RandomSampler;
 
-// ---- Integer products
-// ------------------------------------------------------------------------------------------------------------------
+// ---- Integer products ---------------------------------------------------------------------------
 
 std::vector<float> normal(uint64_t stream, size_t count) {
   std::vector<float> values(count);
@@ -113,8 +112,7 @@ TEST(IntegerLinear, RowsOfZerosAndOfTinyValuesAreZero) {
   for (const float value : y) EXPECT_EQ(value, 0.25f);
 }
 
-// ---- The transformer
-// -------------------------------------------------------------------------------------------------------------------
+// ---- The transformer ----------------------------------------------------------------------------
 
 // The equations of toolchain/generate/transformer.h in double, with the package's integers as real
 // matrices.
@@ -267,8 +265,7 @@ TEST(DeviceTransformer, HoldsItsValuesWhereInputsAreExtreme) {
   }
 }
 
-// ---- Weights
-// ---------------------------------------------------------------------------------------------------------------------------
+// ---- Weights ------------------------------------------------------------------------------------
 
 TEST(WeightDecoder, IsTheStatedArithmetic) {
   const RandomSampler sampler;
@@ -291,8 +288,7 @@ TEST(WeightDecoder, IsTheStatedArithmetic) {
   }
 }
 
-// ---- Seeds
-// -----------------------------------------------------------------------------------------------------------------------------
+// ---- Seeds --------------------------------------------------------------------------------------
 
 std::vector<float> weights_of(const SampledAvatar& sampled) {
   std::vector<float> weights;

@@ -262,7 +262,8 @@ TEST_F(Cli, FollowingKeepsAWalkerInTheMiddle) {
 TEST_F(Cli, ExportedGaussiansGiveTheSamePicture) {
   folder_.write(
       "c.json",
-      R"({"width": 128, "height": 128, "intrinsics": [[170, 0, 64], [0, 170, 64], [0, 0, 1]], "world_to_camera": [[1, 0, 0, 0], [0, -1, 0, 0.5], [0, 0, -1, 3]]})");
+      R"({"width": 128, "height": 128, "intrinsics": [[170, 0, 64], [0, 170, 64], [0, 0, 1]],
+          "world_to_camera": [[1, 0, 0, 0], [0, -1, 0, 0.5], [0, 0, -1, 3]]})");
   ASSERT_EQ(run("render P/avatar.fgn --motion P/motion.fgn --frames 3 --camera c.json -o a.pfm")
                 .exit_code,
             0);

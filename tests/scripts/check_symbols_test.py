@@ -1,4 +1,5 @@
-"""scripts/check_symbols must pass a sound build, name a forbidden symbol of each kind, and refuse a build without its files."""
+"""scripts/check_symbols must pass a sound build, name a forbidden symbol of each kind, and refuse a
+build without its files."""
 import pathlib
 import subprocess
 import sys
@@ -13,13 +14,18 @@ PROGRAM = "int main() { return 0; }\n"
 
 BREACHES = [  # (file, source, words of the finding)
     (SO, "void f(int x) { if (x) throw x; }", "exception: __cxa_throw"),
-    (SO, "#include <cstdio>\nbool f(const char* name) { return std::fopen(name, \"r\"); }", "file: fopen"),
-    (SO, "#include <ctime>\nlong f() { timespec t; clock_gettime(CLOCK_MONOTONIC, &t); return t.tv_sec; }", "clock: clock_gettime"),
-    (SO, "#include <chrono>\nlong f() { return std::chrono::steady_clock::now().time_since_epoch().count(); }", "clock: std::chrono"),
+    (SO, "#include <cstdio>\nbool f(const char* name) { return std::fopen(name, \"r\"); }",
+     "file: fopen"),
+    (SO, "#include <ctime>\nlong f() { timespec t; clock_gettime(CLOCK_MONOTONIC, &t); "
+         "return t.tv_sec; }", "clock: clock_gettime"),
+    (SO, "#include <chrono>\nlong f() { return std::chrono::steady_clock::now()"
+         ".time_since_epoch().count(); }", "clock: std::chrono"),
     (SO, "#include <cstdlib>\nchar* f() { return std::getenv(\"HOME\"); }", "environment: getenv"),
     (SO, "#include <iostream>\nvoid f() { std::cout << 1; }", "stream: std::cout"),
-    (SO, "namespace torch { void grad(); }\nvoid f() { torch::grad(); }", "LibTorch: torch::grad()"),
-    (SO, "extern char large[];\nchar large[500000] = {1};\n#include <cstdlib>\nvoid* f() { return std::malloc(1); }", "the limit is 400000"),
+    (SO, "namespace torch { void grad(); }\nvoid f() { torch::grad(); }",
+     "LibTorch: torch::grad()"),
+    (SO, "extern char large[];\nchar large[500000] = {1};\n#include <cstdlib>\n"
+         "void* f() { return std::malloc(1); }", "the limit is 400000"),
     (ARCHIVE, "#include <cmath>\nfloat f(float x) { return std::exp(x); }", "libm: expf"),
 ]
 
@@ -33,14 +39,16 @@ def build(folder, sources):
         if name in PROGRAMS:
             subprocess.run(["g++", str(text), "-o", str(path)], check=True)
         elif name == SO:
-            subprocess.run(["g++", "-O1", "-shared", "-fPIC", str(text), "-o", str(path)], check=True)
+            command = ["g++", "-O1", "-shared", "-fPIC", str(text), "-o", str(path)]
+            subprocess.run(command, check=True)
         else:
             subprocess.run(["g++", "-O1", "-c", str(text), "-o", str(item)], check=True)
             subprocess.run(["ar", "rc", str(path), str(item)], check=True)
 
 
 def check(folder):
-    run = subprocess.run([sys.executable, str(CHECKER), str(folder)], capture_output=True, text=True, check=False)
+    run = subprocess.run([sys.executable, str(CHECKER), str(folder)], capture_output=True,
+                         text=True, check=False)
     return run.returncode, run.stdout + run.stderr
 
 

@@ -1,7 +1,9 @@
-"""A Slurm cluster on loopback: a controller and some nodes as child processes, all of their state below one folder.
+"""A Slurm cluster on loopback: a controller and some nodes as child processes, all of their state
+below one folder.
 
-No munge: daemons and commands are one user's, on addresses that nobody else can reach, so authentication none is enough. The daemons stay in the
-foreground and die with the test, however that ends.
+No munge: daemons and commands are one user's, on addresses that nobody else can reach, so
+authentication none is enough. The daemons stay in the foreground and die with the test, however
+that ends.
 """
 import contextlib
 import ctypes
@@ -44,7 +46,8 @@ TmpFS={folder}
 PropagateResourceLimits=NONE
 PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 """  # cred_expire is also how long a job waits before it starts again; less is refused
-NODE = "NodeName=n{index} NodeHostname=localhost NodeAddr=127.0.0.1 Port={port} CPUs={cpus} State=UNKNOWN\n"
+NODE = ("NodeName=n{index} NodeHostname=localhost NodeAddr=127.0.0.1 Port={port} CPUs={cpus} "
+        "State=UNKNOWN\n")
 
 
 def free_ports(count):
@@ -64,13 +67,16 @@ class LoopbackCluster:
         self.folder = pathlib.Path(folder)
         self.nodes = nodes
         self.daemons = []
-        self.environment = {name: value for name, value in os.environ.items() if not name.startswith("SLURM_")}
+        self.environment = {
+            name: value for name, value in os.environ.items() if not name.startswith("SLURM_")
+        }
         self.environment["SLURM_CONF"] = str(self.folder / "slurm.conf")
 
     def __enter__(self):
         (self.folder / "state").mkdir()
         controller, *ports = free_ports(1 + self.nodes)
-        text = CONFIGURATION.format(controller=controller, user=getpass.getuser(), folder=self.folder)
+        text = CONFIGURATION.format(controller=controller, user=getpass.getuser(),
+                                    folder=self.folder)
         for index, port in enumerate(ports, 1):
             (self.folder / f"spool-n{index}").mkdir()
             text += NODE.format(index=index, port=port, cpus=os.cpu_count())
@@ -79,7 +85,8 @@ class LoopbackCluster:
             self.start("slurmctld", "-D", "-c", "-i")
             for index in range(1, self.nodes + 1):
                 self.start("slurmd", "-D", "-N", f"n{index}", "-c")
-            self.wait_for(lambda: self.command("sinfo", "-h", "-t", "idle", "-o", "%D").strip() == str(self.nodes), "all nodes to be idle", 60)
+            idle = lambda: self.command("sinfo", "-h", "-t", "idle", "-o", "%D").strip()
+            self.wait_for(lambda: idle() == str(self.nodes), "all nodes to be idle", 60)
         except BaseException:
             self.__exit__()
             raise
@@ -97,10 +104,13 @@ class LoopbackCluster:
 
     def start(self, *command):
         with open(self.folder / "daemons.log", "ab") as log:
-            self.daemons.append(subprocess.Popen(command, env=self.environment, stdout=log, stderr=log, preexec_fn=die_with_parent))
+            self.daemons.append(
+                subprocess.Popen(command, env=self.environment, stdout=log, stderr=log,
+                                 preexec_fn=die_with_parent))
 
     def command(self, *command, **variables):
-        run = subprocess.run(command, env=self.environment | variables, capture_output=True, text=True, check=False)
+        run = subprocess.run(command, env=self.environment | variables, capture_output=True,
+                             text=True, check=False)
         return run.stdout if run.returncode == 0 else ""
 
     def wait_for(self, condition, what, limit_s):
@@ -111,4 +121,5 @@ class LoopbackCluster:
             time.sleep(0.1)
 
     def logs(self):
-        return "".join(f"--- {path.name}\n{path.read_text(errors='replace')[-3000:]}" for path in sorted(self.folder.glob("*.log")))
+        return "".join(f"--- {path.name}\n{path.read_text(errors='replace')[-3000:]}"
+                       for path in sorted(self.folder.glob("*.log")))

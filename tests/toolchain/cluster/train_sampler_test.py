@@ -18,7 +18,10 @@ from loopback_cluster import LoopbackCluster
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 SCRIPT = ROOT / "toolchain" / "cluster" / "train_sampler.sbatch"
 TRAIN, MAKE_PEOPLE = "", ""
-SMALL = ["--d-model", "16", "--blocks", "1", "--heads", "2", "--feed-forward", "32", "--batch", "8", "--rank-timeout", "60"]
+SMALL = [
+    "--d-model", "16", "--blocks", "1", "--heads", "2", "--feed-forward", "32", "--batch", "8",
+    "--rank-timeout", "60"
+]
 
 
 class TrainSampler(unittest.TestCase):
@@ -29,13 +32,16 @@ class TrainSampler(unittest.TestCase):
             raise AssertionError(f"no {missing[0]} here: scripts/setup cluster installs it")
         cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         subprocess.run([MAKE_PEOPLE, cls.folder / "people.fgn"], check=True)
-        cls.cluster = cls.enterClassContext(LoopbackCluster(cls.enterClassContext(tempfile.TemporaryDirectory()), nodes=2))
+        cls.cluster = cls.enterClassContext(
+            LoopbackCluster(cls.enterClassContext(tempfile.TemporaryDirectory()), nodes=2))
 
     def submit(self, name, *options):
-        """The job's number; its output goes to NAME.out. Fifteen minutes, so that Slurm's own signal stays away."""
-        text = self.cluster.command("sbatch", "--parsable", "--cpus-per-task=1", "--time=15", f"--output={self.folder / name}.out", SCRIPT,
-                                    "--population", self.folder / "people.fgn", "-o", self.folder / name, *SMALL, *options,
-                                    FIGURINE_TRAIN=TRAIN)
+        """The job's number; its output goes to NAME.out. Fifteen minutes, so that Slurm's own
+        signal stays away."""
+        text = self.cluster.command("sbatch", "--parsable", "--cpus-per-task=1", "--time=15",
+                                    f"--output={self.folder / name}.out", SCRIPT, "--population",
+                                    self.folder / "people.fgn", "-o", self.folder / name, *SMALL,
+                                    *options, FIGURINE_TRAIN=TRAIN)
         self.assertTrue(text.strip().isdigit(), f"sbatch said '{text}'\n{self.cluster.logs()}")
         return text.strip()
 
@@ -53,7 +59,8 @@ class TrainSampler(unittest.TestCase):
 
     def wait_until(self, number, name, condition, limit_s=90):
         try:
-            self.cluster.wait_for(condition, f"job {number}: {self.job(number).get('JobState')}", limit_s)
+            self.cluster.wait_for(condition, f"job {number}: {self.job(number).get('JobState')}",
+                                  limit_s)
         except AssertionError as late:
             raise AssertionError(f"{late}\n--- output\n{self.output(name)}") from None
 
@@ -61,7 +68,8 @@ class TrainSampler(unittest.TestCase):
         self.wait_until(number, name, (self.folder / name / "run.json").exists)
         time.sleep(1.5)  # run.json is written just before the first iteration
 
-    # What Slurm does at the time limit it does here when asked: scancel --signal, too, reaches all ranks of a job but not its script.
+    # What Slurm does at the time limit it does here when asked: scancel --signal, too, reaches all
+    # ranks of a job but not its script.
     def test_comes_back_when_its_time_is_up_and_finishes(self):
         number = self.submit("run", "--minutes", "0.1")
         self.wait_for_training(number, "run")
@@ -78,7 +86,9 @@ class TrainSampler(unittest.TestCase):
         self.assertGreater(run["iterations"], between["iterations"])
         self.assertIn("start 1: 2 nodes (n[1-2]), rank 0 at 127.0.0.1", output)
         for rank in [0, 1]:  # both took part, and stopped at the same iteration
-            self.assertIn(f"{rank}: figurine-train: {self.folder / 'run'}: stopped after {between['iterations']} iterations", output)
+            self.assertIn(
+                f"{rank}: figurine-train: {self.folder / 'run'}: stopped after "
+                f"{between['iterations']} iterations", output)
         self.assertIn("time is up, back into the queue", output)
         self.assertRegex(output, r"start 2: .* --resume\n")
         self.assertIn(f"0: {self.folder / 'run'}: {run['iterations']} iterations in", output)
@@ -103,7 +113,9 @@ class TrainSampler(unittest.TestCase):
                 command = (folder / "cmdline").read_bytes().split(b"\0")
             except OSError:
                 continue
-            if command[0] == TRAIN.encode() and {f"SLURM_JOB_ID={number}".encode(), f"SLURM_PROCID={rank}".encode()} <= set(variables):
+            if command[0] == TRAIN.encode() and {
+                    f"SLURM_JOB_ID={number}".encode(), f"SLURM_PROCID={rank}".encode()
+            } <= set(variables):
                 return int(folder.name)
         raise AssertionError(f"no process of rank {rank}\n{self.output('killed')}")
 

@@ -29,7 +29,8 @@ namespace {
 nlohmann::json recipe_of_five() {
   nlohmann::json recipe = testing_tools::small_recipe();
   recipe["groups"] = nlohmann::json::parse(R"([{"split": "train", "first": 0, "count": 3},
-    {"split": "validation", "first": 10, "count": 1}, {"split": "test", "first": 20, "count": 1}])");
+    {"split": "validation", "first": 10, "count": 1},
+    {"split": "test", "first": 20, "count": 1}])");
   recipe["initial_weights"]["rounds"] = 0;
   recipe["evaluation"] = nlohmann::json::object();
   return recipe;
