@@ -6,10 +6,33 @@ import tempfile
 import unittest
 
 CHECKER = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_symbols"
-SO, ARCHIVE = "runtime/libfigurine_runtime.so", "runtime/libfigurine_runtime.a"
+SO = "runtime/libfigurine_runtime.so"
+ARCHIVES = [
+    "runtime/libfigurine_runtime.a",
+    "formats/libfigurine_formats.a",
+    "formats/libfigurine_words.a",
+]
 PROGRAMS = ["samples/figurine/figurine", "formats/figurine-inspect"]
 SOUND = '#include <cstdlib>\nvoid* memory(unsigned long n) { return std::malloc(n); }\n'
 PROGRAM = "int main() { return 0; }\n"
+
+CALL = "#include <cmath>\ndouble f(double x, double y) {{ return {} + y; }}"
+INEXACT = [  # (call, symbol)
+    ("sin(x)", "sin"),
+    ("std::sin(float(x))", "sinf"),
+    ("asinh(x)", "asinh"),
+    ("std::atan2(x, y)", "atan2"),
+    ("lgamma(x)", "lgamma"),
+    ("std::erfc(x)", "erfc"),
+    ("std::hypot(x, y)", "hypot"),
+    ("std::fma(x, x, y)", "fma"),
+]
+EXACT = """#include <cmath>
+double f(double x, double y) {
+  return std::sqrt(x) + std::floor(x) + std::nearbyint(x) + std::fmod(x, y) + std::remainder(x, y) +
+         std::fmax(x, y) + double(std::lround(x)) + std::ldexp(x, 3);
+}
+"""
 
 BREACHES = [  # (file, source, words of the finding)
     (SO, "void f(int x) { if (x) throw x; }", "exception: __cxa_throw"),
@@ -20,7 +43,8 @@ BREACHES = [  # (file, source, words of the finding)
     (SO, "#include <iostream>\nvoid f() { std::cout << 1; }", "stream: std::cout"),
     (SO, "namespace torch { void grad(); }\nvoid f() { torch::grad(); }", "LibTorch: torch::grad()"),
     (SO, "extern char large[];\nchar large[500000] = {1};\n#include <cstdlib>\nvoid* f() { return std::malloc(1); }", "the limit is 400000"),
-    (ARCHIVE, "#include <cmath>\nfloat f(float x) { return std::exp(x); }", "libm: expf"),
+    *[(archive, CALL.format("std::exp(x)"), "libm: exp") for archive in ARCHIVES],
+    *[(ARCHIVES[0], CALL.format(call), f"libm: {symbol}\n") for call, symbol in INEXACT],
 ]
 
 
@@ -48,7 +72,7 @@ class CheckSymbols(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
-        build(self.folder.name, {SO: SOUND, ARCHIVE: SOUND, **{name: PROGRAM for name in PROGRAMS}})
+        build(self.folder.name, dict.fromkeys([SO, *ARCHIVES], SOUND) | dict.fromkeys(PROGRAMS, PROGRAM))
 
     def test_passes_a_sound_build_and_prints_its_size(self):
         code, report = check(self.folder.name)
@@ -65,8 +89,17 @@ class CheckSymbols(unittest.TestCase):
                 self.assertIn(words, report)
                 build(self.folder.name, {name: SOUND})
 
+    def test_exact_functions_of_libm_are_no_breach(self):
+        build(self.folder.name, {ARCHIVES[0]: EXACT})
+        command = ["nm", "-u", str(pathlib.Path(self.folder.name, ARCHIVES[0]))]
+        asked = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        for symbol in ["sqrt", "fmod", "fmax", "lround"]:
+            self.assertIn(f" {symbol}\n", asked)
+        code, report = check(self.folder.name)
+        self.assertEqual(code, 0, report)
+
     def test_a_missing_file_is_a_failure(self):
-        for name in [SO, ARCHIVE, *PROGRAMS]:
+        for name in [SO, *ARCHIVES, *PROGRAMS]:
             with self.subTest(name=name):
                 kept = pathlib.Path(self.folder.name, name).read_bytes()
                 pathlib.Path(self.folder.name, name).unlink()
