@@ -24,17 +24,21 @@ def metric(row, group, name):
     return row["quality"][group][name]
 
 
-def describe(values):
+def describe(values, worst=min, best=max):
     values = [v for v in values if v is not None]
     if not values:
         return None
     return {
         "mean": statistics.fmean(values),
-        "worst": min(values),
-        "best": max(values),
+        "worst": worst(values),
+        "best": best(values),
         "deviation": statistics.pstdev(values),
         "count": len(values),
     }
+
+
+def describe_seconds(values):
+    return describe(values, worst=max, best=min)
 
 
 def spread(rows):
@@ -108,8 +112,8 @@ def main():
         "bytes": package.stat().st_size if package.exists() else None,
         "span_db": report.get("span_db"),
         "seconds": {
-            "training_one_core": describe([r["train_seconds"] for r in rows]),
-            "capture_cpu": describe([r["capture_cpu_seconds"] for r in rows]),
+            "training_one_core": describe_seconds([r["train_seconds"] for r in rows]),
+            "capture_cpu": describe_seconds([r["capture_cpu_seconds"] for r in rows]),
             "note": "seconds_per_avatar: two people are trained side by side, each on one core, so one costs two cores half its time",
         },
         "all": everybody,
