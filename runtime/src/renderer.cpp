@@ -34,15 +34,20 @@ Status validate_target(const ImageTarget& target, const Camera& camera) {
   return {};
 }
 
-Status validate_gaussians(const GaussianView& gaussians, size_t index) {
-  const std::string where = "gaussians[" + std::to_string(index) + "]: ";
+// An error of array[index]. Its text is made where there is an error: a sound frame allocates none.
+Status within(const Status& status, const char* array, size_t index) {
+  if (status.ok()) return {};
+  return status.within(std::string(array) + "[" + std::to_string(index) + "]");
+}
+
+Status validate_gaussians(const GaussianView& gaussians) {
   if (gaussians.sh_degree > kMaxShDegree)
-    return invalid(where + "SH degree " + std::to_string(gaussians.sh_degree) + " is above 3");
+    return invalid("SH degree " + std::to_string(gaussians.sh_degree) + " is above 3");
   const size_t n = gaussians.count;
   if (gaussians.position_m.size() != 3 * n || gaussians.covariance_factor.size() != 9 * n ||
       gaussians.opacity.size() != n ||
       gaussians.sh.size() != 3 * n * sh_coefficients(gaussians.sh_degree)) {
-    return invalid(where + "the arrays' sizes do not fit the count of " + std::to_string(n));
+    return invalid("the arrays' sizes do not fit the count of " + std::to_string(n));
   }
   return {};
 }
@@ -67,12 +72,12 @@ struct Renderer::Impl {
     }
     gaussian_count = 0;
     for (size_t i = 0; i < frame.avatars.size(); ++i) {
-      FIG_RETURN_IF_ERROR(validate_avatar(frame.avatars[i].avatar, frame.avatars[i].pose)
-                              .within("avatars[" + std::to_string(i) + "]"));
+      FIG_RETURN_IF_ERROR(
+          within(validate_avatar(frame.avatars[i].avatar, frame.avatars[i].pose), "avatars", i));
       gaussian_count += avatars[static_cast<size_t>(frame.avatars[i].avatar)]->body().texel_count();
     }
     for (size_t i = 0; i < frame.gaussians.size(); ++i) {
-      FIG_RETURN_IF_ERROR(validate_gaussians(frame.gaussians[i], i));
+      FIG_RETURN_IF_ERROR(within(validate_gaussians(frame.gaussians[i]), "gaussians", i));
       gaussian_count += frame.gaussians[i].count;
     }
     if (gaussian_count > kMaxGaussians) {
