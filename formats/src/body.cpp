@@ -1,7 +1,8 @@
 #include "figurine/body.h"
 
-#include <cmath>
 #include <cstring>
+
+#include "figurine/double_math.h"
 
 namespace figurine {
 
@@ -59,17 +60,20 @@ void draw_fourier_channels(uint32_t uv_size, uint32_t octaves, uint32_t first, u
   if (octaves == 0) return;  // no channel, and maybe no memory to draw it in
   FIG_CHECK(first + 4 * octaves <= stride && maps.size() >= size_t(uv_size) * uv_size * stride,
             "map size");
-  constexpr double kPi = 3.14159265358979323846;
+  // pi 2^o (u + 0.5) / T is 2^o (2 u + 1) / (4 T) turns; whole turns go away in integers.
+  const auto wave = [turn = 4 * uv_size](uint32_t octave, uint32_t texel) {
+    const uint64_t angle = (uint64_t{2 * texel + 1} << octave) % turn;
+    return sine_cosine_of_turns(static_cast<double>(angle) / turn);
+  };
   for (uint32_t v = 0; v < uv_size; ++v) {
     for (uint32_t u = 0; u < uv_size; ++u) {
       float* out = &maps[(size_t(v) * uv_size + u) * stride + first];
       for (uint32_t o = 0; o < octaves; ++o) {
-        const double x = kPi * double(1u << o) * (u + 0.5) / uv_size,
-                     y = kPi * double(1u << o) * (v + 0.5) / uv_size;
-        out[4 * o + 0] = static_cast<float>(std::sin(x));
-        out[4 * o + 1] = static_cast<float>(std::cos(x));
-        out[4 * o + 2] = static_cast<float>(std::sin(y));
-        out[4 * o + 3] = static_cast<float>(std::cos(y));
+        const SineCosine x = wave(o, u), y = wave(o, v);
+        out[4 * o + 0] = static_cast<float>(x.sine);
+        out[4 * o + 1] = static_cast<float>(x.cosine);
+        out[4 * o + 2] = static_cast<float>(y.sine);
+        out[4 * o + 3] = static_cast<float>(y.cosine);
       }
     }
   }

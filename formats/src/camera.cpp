@@ -2,12 +2,13 @@
 
 #include <cmath>
 
+#include "figurine/double_math.h"
+
 namespace figurine {
 
 namespace {
 
 constexpr uint32_t kMaxImageSize = 16384;
-constexpr double kPi = 3.14159265358979323846;
 
 Status invalid(const char* what) {
   return Status(StatusCode::kInvalidArgument, std::string("camera: ") + what);
@@ -25,6 +26,11 @@ bool is_rotation(const std::array<float, 12>& m) {
                              double(m[1]) * (double(m[4]) * m[10] - double(m[6]) * m[8]) +
                              double(m[2]) * (double(m[4]) * m[9] - double(m[5]) * m[8]);
   return determinant > 0;
+}
+
+SineCosine sine_cosine_of_degrees(double degrees) {
+  const double turns = degrees / 360;
+  return sine_cosine_of_turns(turns - std::floor(turns));
 }
 
 }  // namespace
@@ -58,19 +64,20 @@ Result<Camera> make_orbit_camera(const OrbitCamera& orbit, uint32_t width_px, ui
     return invalid("orbit distance must be positive and finite");
   if (!(orbit.vertical_fov_deg >= 1 && orbit.vertical_fov_deg <= 170))
     return invalid("orbit field of view must be within 1 and 170 degrees");
-  const double azimuth = orbit.azimuth_deg * kPi / 180, elevation = orbit.elevation_deg * kPi / 180;
+  const SineCosine azimuth = sine_cosine_of_degrees(orbit.azimuth_deg),
+                   elevation = sine_cosine_of_degrees(orbit.elevation_deg),
+                   half_fov = sine_cosine_of_degrees(0.5 * orbit.vertical_fov_deg);
   // Unit vector from target to camera; forward is its opposite. right = forward x up; down
   // completes the OpenCV frame.
-  const double from_target[3] = {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
-                                 std::cos(azimuth) * std::cos(elevation)};
+  const double from_target[3] = {azimuth.sine * elevation.cosine, elevation.sine,
+                                 azimuth.cosine * elevation.cosine};
   const double forward[3] = {-from_target[0], -from_target[1], -from_target[2]};
-  const double right[3] = {std::cos(azimuth), 0, -std::sin(azimuth)};
+  const double right[3] = {azimuth.cosine, 0, -azimuth.sine};
   const double down[3] = {forward[1] * right[2] - forward[2] * right[1],
                           forward[2] * right[0] - forward[0] * right[2],
                           forward[0] * right[1] - forward[1] * right[0]};
   Camera camera{.width_px = width_px, .height_px = height_px};
-  camera.fy_px =
-      static_cast<float>(0.5 * height_px / std::tan(0.5 * orbit.vertical_fov_deg * kPi / 180));
+  camera.fy_px = static_cast<float>(0.5 * height_px * half_fov.cosine / half_fov.sine);
   camera.fx_px = camera.fy_px;
   camera.cx_px = 0.5f * static_cast<float>(width_px);
   camera.cy_px = 0.5f * static_cast<float>(height_px);

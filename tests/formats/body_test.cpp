@@ -89,5 +89,31 @@ TEST(FourierChannels, AreSinesAndCosinesOfTexelCentres) {
   EXPECT_LE(error.largest(), 6.1e-8);  // one rounding of a value up to 1
 }
 
+// The sizes and octaves of the shipped avatars: no bit of their input is a matter of who computes
+// it.
+TEST(FourierChannels, OfShippedSizesAreTheTrueValuesRoundedOnce) {
+  constexpr uint32_t kOctaves = 5, kStride = 4 * kOctaves;
+  constexpr long double kPi = 3.141592653589793238462643383279502884L;
+  for (const uint32_t size : {32u, 128u}) {
+    std::vector<float> maps(size_t(size) * size * kStride);
+    draw_fourier_channels(size, kOctaves, 0, kStride, maps);
+    size_t different = 0;
+    for (uint32_t v = 0; v < size; ++v) {
+      for (uint32_t o = 0; o < kOctaves; ++o) {
+        const long double angle = kPi * (1 << o) * (v + 0.5L) / size;
+        const float sine = static_cast<float>(std::sin(angle)),
+                    cosine = static_cast<float>(std::cos(angle));
+        for (uint32_t u = 0; u < size; ++u) {
+          const float* down = &maps[(size_t(v) * size + u) * kStride + 4 * o];
+          const float* across = &maps[(size_t(u) * size + v) * kStride + 4 * o];
+          different += (across[0] != sine) + (across[1] != cosine);
+          different += (down[2] != sine) + (down[3] != cosine);
+        }
+      }
+    }
+    EXPECT_EQ(different, 0u) << "of " << maps.size() << " values at T = " << size;
+  }
+}
+
 }  // namespace
 }  // namespace figurine

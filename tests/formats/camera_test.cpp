@@ -90,6 +90,16 @@ TEST(OrbitCamera, FieldOfViewSpansTheImageHeight) {
   }
 }
 
+// Quarter turns have no crumbs of pi in them, and whole turns change nothing.
+TEST(OrbitCamera, WholeTurnsAndQuarterTurnsAreExact) {
+  const std::array<float, 12> quarter{0, 0, -1, 0, 0, -1, 0, 0, -1, 0, 0, 3};
+  EXPECT_EQ(orbit({.azimuth_deg = 90}).view_from_world, quarter);
+  for (const float turn : {-36000.0f, -360.0f, 360.0f, 720.0f}) {
+    EXPECT_EQ(orbit({.azimuth_deg = turn + 90}).view_from_world, quarter) << turn;
+    EXPECT_EQ(orbit({.azimuth_deg = turn}).view_from_world, orbit({}).view_from_world) << turn;
+  }
+}
+
 TEST(OrbitCamera, RejectsValuesOutsideItsRanges) {
   for (const OrbitCamera& bad :
        {OrbitCamera{.azimuth_deg = kNan}, OrbitCamera{.azimuth_deg = kInfinity},

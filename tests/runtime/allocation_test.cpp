@@ -127,6 +127,28 @@ TEST(Allocation, NoFrameAllocatesAfterTheFirst) {
   }
 }
 
+// The 101st set's name in a message no longer fits into a short string: it must be made on errors
+// alone.
+TEST(Allocation, ManySetsAndAvatarsAllocateNothingEither) {
+  if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
+  const SyntheticBody body = make_test_body({});
+  const SyntheticAvatar avatar = make_test_avatar(body, {});
+  const std::unique_ptr<Renderer> renderer = make_renderer();
+  const Result<AvatarId> id = renderer->add_avatar(*avatar.package, *body.package);
+  ASSERT_TRUE(id.ok());
+  const Scene scene = make_random_scene(10, 1, 4);
+  const std::vector<GaussianView> sets(101, scene.view());
+  const SyntheticPose pose = make_test_pose(body.body(), 1);
+  const std::vector<FrameAvatar> seen(101, {.avatar = *id, .pose = pose.view()});
+  std::vector<uint8_t> rgba(32 * 32 * 4);
+  const Frame frame{.camera = make_test_camera(32, 32), .avatars = seen, .gaussians = sets};
+  const ImageTarget target{.pixels = rgba.data(), .stride_bytes = 128};
+  ASSERT_TRUE(renderer->render(frame, target).ok());
+  const uint64_t after_first = g_allocations;
+  ASSERT_TRUE(renderer->render(frame, target).ok());
+  EXPECT_EQ(g_allocations - after_first, 0u);
+}
+
 void expect_memory_is_what_was_taken(Held held) {
   const SyntheticBody body = make_test_body({.uv_size = 128});
   const SyntheticAvatar avatar =

@@ -12,6 +12,7 @@
 
 #include "figurine/avatar_sampler.h"
 #include "figurine/package.h"
+#include "formats/package_samples.h"
 #include "runtime/random_sampler.h"
 #include "runtime/src/sample/device_transformer.h"
 #include "runtime/src/sample/integer_linear.h"
@@ -393,6 +394,34 @@ TEST_F(AvatarSamplerTest, ADenoiserThatIsNotFiniteIsRefused) {
   const Status status = (*sampler)->sample({.seed = 1}, person);
   EXPECT_FALSE(status.ok());
   EXPECT_NE(status.message().find("not finite"), std::string::npos) << status.message();
+}
+
+// Borrowed is what the package's bytes hold: neither the Package nor the description that it
+// verified has to live on. Under a sanitizer a read of either is an error.
+TEST(AvatarSampler, OutlivesThePackageThatItWasMadeFrom) {
+  const AlignedBytes bytes(*samples::SamplerSample().write());
+  SampledAvatar early, late;
+  std::unique_ptr<AvatarSampler> sampler;
+  {
+    const Result<Package> package = Package::open(bytes.bytes(), "sample");
+    ASSERT_TRUE(package.ok()) << package.status().message();
+    auto created = AvatarSampler::create(package->sampler());
+    ASSERT_TRUE(created.ok()) << created.status().message();
+    sampler = std::move(*created);
+    ASSERT_TRUE(sampler->sample({.seed = 3}, early).ok());
+  }
+  EXPECT_GT(sampler->macs_per_evaluation(), 0u);
+  ASSERT_TRUE(sampler->sample({.seed = 3}, late).ok());
+  sampler.reset();  // an avatar needs no sampler either
+  for (const SampledAvatar* person : {&early, &late}) {
+    const Avatar& avatar = person->avatar();
+    EXPECT_TRUE(validate_fixed_point(avatar.network, avatar.fixed_point).ok());
+    EXPECT_EQ(avatar.pose_statistics.covariance.size(),
+              9 * avatar.pose_statistics.joints.size() * avatar.pose_statistics.joints.size());
+    for (const float value : avatar.golden.rotations) EXPECT_TRUE(std::isfinite(value));
+  }
+  EXPECT_EQ(hash_weights(early.avatar().fixed_point, early.avatar().shape),
+            hash_weights(late.avatar().fixed_point, late.avatar().shape));
 }
 
 class Counted : public AvatarSampler::Trace {

@@ -1,16 +1,40 @@
 """scripts/check_symbols must pass a sound build, name a forbidden symbol of each kind, and refuse a
 build without its files."""
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
 import unittest
 
 CHECKER = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_symbols"
-SO, ARCHIVE = "runtime/libfigurine_runtime.so", "runtime/libfigurine_runtime.a"
+SO = "runtime/libfigurine_runtime.so"
+ARCHIVES = [
+    "runtime/libfigurine_runtime.a",
+    "formats/libfigurine_formats.a",
+    "formats/libfigurine_words.a",
+]
 PROGRAMS = ["samples/figurine/figurine", "formats/figurine-inspect"]
 SOUND = '#include <cstdlib>\nvoid* memory(unsigned long n) { return std::malloc(n); }\n'
 PROGRAM = "int main() { return 0; }\n"
+
+CALL = "#include <cmath>\ndouble f(double x, double y) {{ return {} + y; }}"
+INEXACT = [  # (call, symbol)
+    ("sin(x)", "sin"),
+    ("std::sin(float(x))", "sinf"),
+    ("asinh(x)", "asinh"),
+    ("std::atan2(x, y)", "atan2"),
+    ("lgamma(x)", "lgamma"),
+    ("std::erfc(x)", "erfc"),
+    ("std::hypot(x, y)", "hypot"),
+    ("std::fma(x, x, y)", "fma"),
+]
+EXACT = """#include <cmath>
+double f(double x, double y) {
+  return std::sqrt(x) + std::floor(x) + std::nearbyint(x) + std::fmod(x, y) + std::remainder(x, y) +
+         std::fmax(x, y) + double(std::lround(x)) + std::ldexp(x, 3);
+}
+"""
 
 BREACHES = [  # (file, source, words of the finding)
     (SO, "void f(int x) { if (x) throw x; }", "exception: __cxa_throw"),
@@ -26,8 +50,36 @@ BREACHES = [  # (file, source, words of the finding)
      "LibTorch: torch::grad()"),
     (SO, "extern char large[];\nchar large[500000] = {1};\n#include <cstdlib>\n"
          "void* f() { return std::malloc(1); }", "the limit is 400000"),
-    (ARCHIVE, "#include <cmath>\nfloat f(float x) { return std::exp(x); }", "libm: expf"),
+    *[(archive, CALL.format("std::exp(x)"), "libm: exp") for archive in ARCHIVES],
+    *[(ARCHIVES[0], CALL.format(call), f"libm: {symbol}\n") for call, symbol in INEXACT],
 ]
+
+
+# A kernel's object as it should be, and two that a linker might take for everybody's.
+KERNEL = "namespace figurine::kernels {{ void {}(int& x) {{ x = {}; }} }}\n"
+KERNEL_BREACHES = [  # (source, words of the finding)
+    ("inline int shared(int x) { return x + 1; }\n"
+     "namespace figurine::kernels { void add_dots_baseline(int& x) { x = shared(x); } }\n",
+     "kernel add_dots_baseline: defines shared(int): a weak symbol"),
+    (KERNEL.format("add_dots_baseline", 1) + "int helper() { return 2; }\n",
+     "kernel add_dots_baseline: defines helper(): not its row's"),
+    (KERNEL.format("another_name", 1), "kernel add_dots_baseline: there is none"),
+]
+
+
+def baseline_rows():
+    text = (CHECKER.parents[1] / "runtime/src/kernels/kernels.inc").read_text(encoding="utf-8")
+    return [f"{row}_baseline" for row in re.findall(r"^FIG_KERNEL\(\w+, (\w+), baseline\)", text,
+                                                    re.MULTILINE)]
+
+
+def add_kernel(folder, name, source):
+    """Compiles a kernel's object, -O0 so that inline functions stay, into the runtime's archive."""
+    text = pathlib.Path(folder, f"{name}.cpp")
+    text.write_text(source, encoding="utf-8")
+    item = pathlib.Path(folder, f"{name}.cpp.o")
+    subprocess.run(["g++", "-c", str(text), "-o", str(item)], check=True)
+    subprocess.run(["ar", "rc", str(pathlib.Path(folder, ARCHIVES[0])), str(item)], check=True)
 
 
 def build(folder, sources):
@@ -56,7 +108,11 @@ class CheckSymbols(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
-        build(self.folder.name, {SO: SOUND, ARCHIVE: SOUND, **{name: PROGRAM for name in PROGRAMS}})
+        build(self.folder.name,
+              dict.fromkeys([SO, *ARCHIVES], SOUND) | dict.fromkeys(PROGRAMS, PROGRAM))
+        self.assertGreater(len(baseline_rows()), 3)
+        for row in baseline_rows():
+            add_kernel(self.folder.name, row, KERNEL.format(row, 1))
 
     def test_passes_a_sound_build_and_prints_its_size(self):
         code, report = check(self.folder.name)
@@ -73,8 +129,25 @@ class CheckSymbols(unittest.TestCase):
                 self.assertIn(words, report)
                 build(self.folder.name, {name: SOUND})
 
+    def test_a_kernel_defines_its_row_and_nothing_else(self):
+        for source, words in KERNEL_BREACHES:
+            with self.subTest(words=words):
+                add_kernel(self.folder.name, "add_dots_baseline", source)
+                code, report = check(self.folder.name)
+                self.assertEqual(code, 1, report)
+                self.assertIn(words, report)
+
+    def test_exact_functions_of_libm_are_no_breach(self):
+        build(self.folder.name, {ARCHIVES[0]: EXACT})
+        command = ["nm", "-u", str(pathlib.Path(self.folder.name, ARCHIVES[0]))]
+        asked = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        for symbol in ["sqrt", "fmod", "fmax", "lround"]:
+            self.assertIn(f" {symbol}\n", asked)
+        code, report = check(self.folder.name)
+        self.assertEqual(code, 0, report)
+
     def test_a_missing_file_is_a_failure(self):
-        for name in [SO, ARCHIVE, *PROGRAMS]:
+        for name in [SO, *ARCHIVES, *PROGRAMS]:
             with self.subTest(name=name):
                 kept = pathlib.Path(self.folder.name, name).read_bytes()
                 pathlib.Path(self.folder.name, name).unlink()

@@ -1,5 +1,5 @@
-// exp, expm1, log, sine and cosine in double, of our own: what places noise levels and draws noise
-// gives the same bits on every CPU.
+// exp, expm1, log, sine and cosine in double, of our own: what places noise levels, draws noise and
+// Fourier channels and turns cameras gives the same bits on every CPU.
 //
 // Exactly rounded IEEE operations in a fixed order, as the runtime's float_math.h. Plain power
 // series, cut where the next term is below half a bit: a level or a random number is worth a few

@@ -6,8 +6,8 @@
 //   (*sampler)->sample({.seed = 7}, person);
 //   person.avatar();   // in float and in fixed point: write it (formats/writer) or draw it
 //
-// No files, no clock, no exceptions. A sampler is used by one thread at a time; its package's bytes
-// must outlive it and all that it made.
+// No files, no clock, no exceptions. A sampler is used by one thread at a time. The package's bytes
+// must outlive it and all that it made; the Package itself need not.
 #pragma once
 
 #include <cstdint>

@@ -26,9 +26,9 @@ Status invalid(const std::string& what) {
 }  // namespace
 
 struct AvatarSampler::Impl {
-  explicit Impl(const Sampler& from) : sampler(&from) {}
+  explicit Impl(const Sampler& from) : sampler(from) {}
 
-  const Sampler* sampler;
+  const Sampler sampler;  // a copy: its arrays alone are borrowed
   NoiseSchedule schedule;
   std::unique_ptr<DeviceTransformer> transformer;
   std::vector<NoiseLevel> levels;
@@ -36,14 +36,14 @@ struct AvatarSampler::Impl {
   Buffer<float> noisy, clean;         // [D]
 
   bool allocate() {
-    const size_t size = sampler->direction_scale.size();
+    const size_t size = sampler.direction_scale.size();
     return z.ensure(size) && x0.ensure(size) && previous_x0.ensure(size) && noisy.ensure(size) &&
            clean.ensure(size);
   }
 
   // The start: standard normal, whatever the mix.
   void fill_start(const SampleRequest& request) {
-    const size_t size = sampler->direction_scale.size();
+    const size_t size = sampler.direction_scale.size();
     fill_normal(request.seed, kWeightsStream, noisy.span(size));
     for (size_t k = 0; k < size; ++k) z[k] = double{noisy[k]};
     if (request.mix == 0) return;
@@ -55,24 +55,24 @@ struct AvatarSampler::Impl {
   // Values [D] to an avatar in float and in fixed point.
   Status decode(std::span<const double> values, std::vector<float>& weights,
                 FixedPointStorage& fixed_point, Avatar& avatar) const {
-    weights.resize(sampler->mean.size());
-    decode_weights(*sampler, values, weights);
+    weights.resize(sampler.mean.size());
+    decode_weights(sampler, values, weights);
     for (const float weight : weights) {
       if (!std::isfinite(weight))
         return Status(StatusCode::kCorrupt, "sampling: a weight is not finite");
     }
-    avatar.name = sampler->name;
-    avatar.body_name = sampler->body_name, avatar.body_hash = sampler->body_hash;
-    avatar.preset = sampler->preset;
-    avatar.template_mode = sampler->template_mode;
-    avatar.map_statistics = sampler->map_statistics;
-    avatar.fourier_octaves = sampler->fourier_octaves;
-    avatar.decoding = sampler->decoding;
-    avatar.pose_statistics = sampler->pose_statistics;
-    avatar.golden = sampler->golden;
-    avatar.network = sampler->network;
+    avatar.name = sampler.name;
+    avatar.body_name = sampler.body_name, avatar.body_hash = sampler.body_hash;
+    avatar.preset = sampler.preset;
+    avatar.template_mode = sampler.template_mode;
+    avatar.map_statistics = sampler.map_statistics;
+    avatar.fourier_octaves = sampler.fourier_octaves;
+    avatar.decoding = sampler.decoding;
+    avatar.pose_statistics = sampler.pose_statistics;
+    avatar.golden = sampler.golden;
+    avatar.network = sampler.network;
     std::span<const float> rest = weights;
-    const std::vector<size_t> sizes = sampler_token_sizes(*sampler);
+    const std::vector<size_t> sizes = sampler_token_sizes(sampler);
     size_t token = 0;
     for (Layer& layer : avatar.network.layers) {
       if (layer.op != LayerOp::kConv2d) continue;
@@ -82,7 +82,7 @@ struct AvatarSampler::Impl {
       rest = rest.subspan(kernel + layer.out_channels);
     }
     avatar.shape = rest;
-    FIG_RETURN_IF_ERROR(fixed_point.quantise(avatar.network, sampler->values));
+    FIG_RETURN_IF_ERROR(fixed_point.quantise(avatar.network, sampler.values));
     avatar.fixed_point = fixed_point.view();
     return {};
   }
@@ -144,7 +144,7 @@ Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& samp
   Result<NoiseSchedule> schedule = NoiseSchedule::create(sampler.noise);
   if (!schedule.ok()) return schedule.status();
   impl->schedule = *schedule;
-  Result<std::unique_ptr<DeviceTransformer>> transformer = DeviceTransformer::create(sampler);
+  Result<std::unique_ptr<DeviceTransformer>> transformer = DeviceTransformer::create(impl->sampler);
   if (!transformer.ok()) return transformer.status();
   impl->transformer = std::move(*transformer);
   return std::unique_ptr<AvatarSampler>(new AvatarSampler(std::move(impl)));
@@ -152,12 +152,12 @@ Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& samp
 
 Status AvatarSampler::sample(const SampleRequest& request, SampledAvatar& out, Trace* trace) {
   Impl& impl = *impl_;
-  const uint32_t steps = request.steps == 0 ? impl.sampler->steps : request.steps;
+  const uint32_t steps = request.steps == 0 ? impl.sampler.steps : request.steps;
   if (steps > kMaxSolverSteps)
     return invalid("steps " + std::to_string(steps) + " are more than " +
                    std::to_string(kMaxSolverSteps));
   if (!(request.mix >= 0 && request.mix <= 1)) return invalid("the mix is not within 0 and 1");
-  const size_t size = impl.sampler->direction_scale.size();
+  const size_t size = impl.sampler.direction_scale.size();
   impl.levels.resize(size_t{steps} + 1);
   solver_levels(impl.schedule, true, impl.levels);
   impl.fill_start(request);
@@ -170,7 +170,7 @@ Status AvatarSampler::sample(const SampleRequest& request, SampledAvatar& out, T
     if (predictor.traced.ok())
       predictor.traced = trace->after_step(static_cast<uint32_t>(step) + 1, level.lambda, out);
   });
-  const SolverOptions options{.method = request.method.value_or(impl.sampler->method)};
+  const SolverOptions options{.method = request.method.value_or(impl.sampler.method)};
   const SolverStorage<double> storage{impl.x0.span(size), impl.previous_x0.span(size)};
   FIG_RETURN_IF_ERROR(solve<double>(options, impl.levels, predictor, storage, impl.z.span(size),
                                     trace == nullptr ? nullptr : &watcher));
@@ -185,7 +185,7 @@ uint64_t AvatarSampler::memory_bytes() const {
 }
 
 uint64_t AvatarSampler::macs_per_evaluation() const {
-  const Sampler& sampler = *impl_->sampler;
+  const Sampler& sampler = impl_->sampler;
   const uint64_t tokens = sampler.ranks.size() + 1, d = sampler.denoiser.d_model;
   uint64_t macs = 0;
   const std::vector<MatrixShape> matrices = denoiser_matrices(sampler.denoiser, sampler.ranks);

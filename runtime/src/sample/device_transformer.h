@@ -24,7 +24,7 @@ namespace figurine {
 
 class DeviceTransformer {
  public:
-  // Borrows from the sampler's package, which must outlive it. kOutOfMemory.
+  // Borrows the sampler and its arrays, which must outlive it. kOutOfMemory.
   static Result<std::unique_ptr<DeviceTransformer>> create(
       const Sampler& sampler, const KernelTable& kernels = best_kernels());
 
