@@ -65,15 +65,21 @@ void draw_fourier_channels(uint32_t uv_size, uint32_t octaves, uint32_t first, u
     const uint64_t angle = (uint64_t{2 * texel + 1} << octave) % turn;
     return sine_cosine_of_turns(static_cast<double>(angle) / turn);
   };
-  for (uint32_t v = 0; v < uv_size; ++v) {
-    for (uint32_t u = 0; u < uv_size; ++u) {
-      float* out = &maps[(size_t(v) * uv_size + u) * stride + first];
-      for (uint32_t o = 0; o < octaves; ++o) {
-        const SineCosine x = wave(o, u), y = wave(o, v);
-        out[4 * o + 0] = static_cast<float>(x.sine);
-        out[4 * o + 1] = static_cast<float>(x.cosine);
-        out[4 * o + 2] = static_cast<float>(y.sine);
-        out[4 * o + 3] = static_cast<float>(y.cosine);
+  const auto channels_at = [&](uint32_t u, uint32_t v) {
+    return &maps[(size_t{v} * uv_size + u) * stride + first];
+  };
+  // Every value is that of a whole column or of a whole row.
+  for (uint32_t o = 0; o < octaves; ++o) {
+    for (uint32_t texel = 0; texel < uv_size; ++texel) {
+      const SineCosine at = wave(o, texel);
+      const float sine = static_cast<float>(at.sine), cosine = static_cast<float>(at.cosine);
+      for (uint32_t other = 0; other < uv_size; ++other) {
+        float* const in_column = channels_at(texel, other) + 4 * o;
+        in_column[0] = sine;
+        in_column[1] = cosine;
+        float* const in_row = channels_at(other, texel) + 4 * o;
+        in_row[2] = sine;
+        in_row[3] = cosine;
       }
     }
   }
