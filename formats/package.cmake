@@ -35,10 +35,10 @@ target_include_directories(figurine_writer SYSTEM PRIVATE "${CMAKE_CURRENT_BINAR
 target_compile_options(figurine_writer PRIVATE -fno-exceptions)
 figurine_guard(figurine_formats figurine_writer)
 
-# Needs figurine_ports_files (ports/linux), which is configured after this folder: targets are linked by name.
+# Needs figurine_host (ports/host), which is configured after this folder: targets are linked by name.
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 add_executable(figurine-inspect inspect/compare.cpp inspect/describe.cpp inspect/main.cpp inspect/print.cpp)
 target_compile_definitions(figurine-inspect PRIVATE FIGURINE_VERSION="${PROJECT_VERSION}")
 target_include_directories(figurine-inspect PRIVATE "${PROJECT_SOURCE_DIR}")
-target_link_libraries(figurine-inspect PRIVATE figurine_formats figurine_ports_files CLI11::CLI11 nlohmann_json::nlohmann_json)
+target_link_libraries(figurine-inspect PRIVATE figurine_formats figurine_host CLI11::CLI11 nlohmann_json::nlohmann_json)

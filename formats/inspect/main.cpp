@@ -10,7 +10,7 @@
 
 #include "formats/inspect/describe.h"
 #include "formats/inspect/print.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "samples/figurine/allocation_counter.h"
 #include "samples/figurine/cast.h"
 #include "samples/figurine/commands.h"

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
 #include "samples/figurine/frame_sink.h"
 
 namespace figurine::samples {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "figurine/status.h"
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 #include "samples/figurine/parse.h"
 
 namespace figurine::samples {

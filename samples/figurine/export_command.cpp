@@ -3,7 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "samples/figurine/cast.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/device_options.h"

@@ -3,10 +3,10 @@
 #include <deque>
 #include <vector>
 
-#include "ports/linux/atomic_file.h"
-#include "ports/linux/pfm.h"
-#include "ports/linux/png.h"
-#include "ports/linux/video.h"
+#include "ports/host/atomic_file.h"
+#include "ports/media/pfm.h"
+#include "ports/media/png.h"
+#include "ports/media/video.h"
 
 namespace figurine::samples {
 

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "figurine/renderer.h"
-#include "ports/linux/image.h"
-#include "ports/linux/y4m.h"
+#include "ports/media/image.h"
+#include "ports/media/y4m.h"
 #include "samples/figurine/parse.h"
 
 namespace figurine::samples {

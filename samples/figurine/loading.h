@@ -8,7 +8,7 @@
 
 #include "figurine/package.h"
 #include "figurine/status.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 
 namespace figurine::samples {
 

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "ports/linux/png.h"
+#include "ports/media/png.h"
 #include "samples/figurine/cast.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/device_options.h"

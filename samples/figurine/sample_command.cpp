@@ -10,7 +10,7 @@
 #include "figurine/avatar_sampler.h"
 #include "figurine/renderer.h"
 #include "formats/writer/package_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/contact_sheet.h"
 #include "samples/figurine/device_options.h"

@@ -7,7 +7,7 @@
 
 #include "figurine/avatar_sampler.h"
 #include "figurine/renderer.h"
-#include "ports/linux/png.h"
+#include "ports/media/png.h"
 #include "samples/figurine/device_options.h"
 #include "samples/figurine/frame_log.h"
 #include "samples/figurine/frame_sink.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "figurine/avatar_sampler.h"
-#include "ports/linux/png.h"
+#include "ports/media/png.h"
 #include "samples/figurine/cast.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/device_options.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "ports/linux/pfm.h"
-#include "ports/linux/png.h"
+#include "ports/media/pfm.h"
+#include "ports/media/png.h"
 #include "runtime/test_packages.h"
 #include "samples/figurine/camera_spec.h"
 #include "samples/figurine/image_error.h"

@@ -1,7 +1,7 @@
 // samples/minimal: its raw frame is the one that figurine renders, and its errors are one line.
 #include <gtest/gtest.h>
 
-#include "ports/linux/png.h"
+#include "ports/media/png.h"
 #include "samples/program.h"
 
 namespace figurine::tests {

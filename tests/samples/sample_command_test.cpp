@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/writer/sampler_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "runtime/random_sampler.h"
 #include "samples/program.h"
 

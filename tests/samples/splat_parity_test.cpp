@@ -8,7 +8,7 @@
 
 #include "figurine/camera.h"
 #include "oracle/splat_oracle.h"
-#include "ports/linux/pfm.h"
+#include "ports/media/pfm.h"
 #include "runtime/test_packages.h"
 #include "samples/gaussians/ply.h"
 #include "samples/ply_text.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "figurine/package.h"
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 #include "toolchain/body/motion_clip.h"
 #include "toolchain/capture/folds.h"
 #include "toolchain/capture/rig.h"

@@ -11,8 +11,8 @@
 #include <cstring>
 #include <filesystem>
 
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
 #include "toolchain/body/skeleton.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"

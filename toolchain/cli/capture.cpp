@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "figurine/package.h"
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
 #include "toolchain/body/clip.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/cli/commands.h"

@@ -8,7 +8,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "formats/writer/population_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"

@@ -10,7 +10,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "gtest/gtest.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/texel_body.h"
 #include "toolchain/dataset/dataset.h"

@@ -1,5 +1,5 @@
 // Image files: known bytes, round trips, and broken files.
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <limits>
 #include <random>
 
-#include "ports/linux/pfm.h"
-#include "ports/linux/png.h"
+#include "ports/media/pfm.h"
+#include "ports/media/png.h"
 
 namespace figurine::ports {
 namespace {

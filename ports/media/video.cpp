@@ -1,4 +1,4 @@
-#include "ports/linux/video.h"
+#include "ports/media/video.h"
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ports/linux/atomic_file.h"
+#include "ports/host/atomic_file.h"
 
 extern char** environ;
 

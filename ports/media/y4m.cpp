@@ -1,4 +1,4 @@
-#include "ports/linux/y4m.h"
+#include "ports/media/y4m.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // PNG, 8 bits a channel, through libpng's simplified interface: bytes in memory, no files
-// (ports/linux/files.h writes them atomically).
+// (ports/host/files.h writes them atomically).
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "figurine/status.h"
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 
 namespace figurine::ports {
 

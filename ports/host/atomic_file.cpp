@@ -1,4 +1,4 @@
-#include "ports/linux/atomic_file.h"
+#include "ports/host/atomic_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,5 +1,5 @@
 // Files appear whole or not at all, and errors name the path and the system's reason.
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "ports/linux/folder_lock.h"
+#include "ports/host/folder_lock.h"
 
 namespace figurine::ports {
 namespace {

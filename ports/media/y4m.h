@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "figurine/status.h"
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 
 namespace figurine::ports {
 

@@ -1,6 +1,6 @@
 // Files on Linux: memory maps for reading, write-to-temporary + fsync + rename for writing. Every
 // error names the path and the system's reason.
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 
 #include <fcntl.h>
 #include <sys/mman.h>

@@ -1,4 +1,4 @@
-#include "ports/linux/folder_lock.h"
+#include "ports/host/folder_lock.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

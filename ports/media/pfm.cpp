@@ -1,4 +1,4 @@
-#include "ports/linux/pfm.h"
+#include "ports/media/pfm.h"
 
 #include <bit>
 #include <charconv>

@@ -1,6 +1,6 @@
 // Video: the header, planes and colours of y4m by hand, and that neither kind of file leaves
 // anything half-written.
-#include "ports/linux/video.h"
+#include "ports/media/video.h"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -12,8 +12,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "ports/linux/atomic_file.h"
-#include "ports/linux/y4m.h"
+#include "ports/host/atomic_file.h"
+#include "ports/media/y4m.h"
 
 namespace figurine::ports {
 namespace {

@@ -1,4 +1,4 @@
-#include "ports/linux/png.h"
+#include "ports/media/png.h"
 
 #include <png.h>
 

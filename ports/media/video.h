@@ -6,8 +6,8 @@
 #include <string>
 
 #include "figurine/status.h"
-#include "ports/linux/image.h"
-#include "ports/linux/y4m.h"
+#include "ports/media/image.h"
+#include "ports/media/y4m.h"
 
 namespace figurine::ports {
 
