@@ -12,7 +12,7 @@ SOUND = {
     "formats/include/figurine/check.h": "#include <cstdio>\n",
     "formats/src/package.cpp": '#include <flatbuffers/verifier.h>\n#include <xxhash.h>\n#include "figurine/pose.h"\n',
     "formats/writer/package_writer.h": '#include "figurine/pose.h"\n',
-    "formats/inspect/main.cpp": '#include <iostream>\n#include "ports/host/files.h"\n#include "figurine/pose.h"\n',
+    "samples/inspect/main.cpp": '#include <iostream>\n#include "ports/host/files.h"\n#include "figurine/pose.h"\n',
     "runtime/include/figurine/renderer.h": '#include "figurine/pose.h"\n',
     "runtime/src/nn/unet.cpp": '#include <xnnpack.h>\n#include "runtime/src/kernels/blend.h"\n// throws nothing; "try {" in a comment is no try\n',
     "runtime/src/kernels/blend.h": "#include <stdint.h>\n",

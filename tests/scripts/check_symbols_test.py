@@ -8,7 +8,7 @@ import unittest
 
 CHECKER = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_symbols"
 SO, ARCHIVE = "runtime/libfigurine_runtime.so", "runtime/libfigurine_runtime.a"
-PROGRAMS = ["samples/figurine/figurine", "formats/figurine-inspect"]
+PROGRAMS = ["samples/figurine/figurine", "samples/inspect/figurine-inspect"]
 SOUND = '#include <cstdlib>\nvoid* memory(unsigned long n) { return std::malloc(n); }\n'
 PROGRAM = "int main() { return 0; }\n"
 

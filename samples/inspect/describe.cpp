@@ -1,4 +1,4 @@
-#include "formats/inspect/describe.h"
+#include "samples/inspect/describe.h"
 
 #include <algorithm>
 #include <charconv>
@@ -6,7 +6,7 @@
 #include <format>
 #include <limits>
 
-#include "formats/inspect/tensor_values.h"
+#include "samples/inspect/tensor_values.h"
 
 namespace figurine::inspect {
 

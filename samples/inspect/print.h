@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "formats/inspect/describe.h"
+#include "samples/inspect/describe.h"
 
 namespace figurine::inspect {
 

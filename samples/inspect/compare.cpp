@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/inspect/describe.h"
-#include "formats/inspect/tensor_values.h"
+#include "samples/inspect/describe.h"
+#include "samples/inspect/tensor_values.h"
 
 namespace figurine::inspect {
 

@@ -8,9 +8,9 @@
 #include <exception>
 #include <string>
 
-#include "formats/inspect/describe.h"
-#include "formats/inspect/print.h"
 #include "ports/host/files.h"
+#include "samples/inspect/describe.h"
+#include "samples/inspect/print.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "formats/inspect/print.h"
+#include "samples/inspect/print.h"
 
 #include <algorithm>
 #include <format>
