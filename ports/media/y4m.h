@@ -1,14 +1,9 @@
 // YUV4MPEG2 (.y4m): uncompressed video that every encoder and most players read.
 //
-// Layout 4:2:0 with chroma in the middle of each 2x2 block ("C420jpeg"), limited range. The format
-// has no field for the matrix, so the choice follows what players assume: BT.601 up to 576 rows,
-// BT.709 above. With R'G'B' in [0,1] as stored (no transfer function is applied):
-//   Y' = Kr R' + (1 - Kr - Kb) G' + Kb B',   Cb = (B' - Y') / (2 (1 - Kb)),   Cr = (R' - Y') / (2
-//       (1 - Kr)),
-//   codes: round(16 + 219 Y'), round(128 + 224 Cb), round(128 + 224 Cr);   BT.601: Kr 0.299, Kb
-//       0.114; BT.709: Kr 0.2126, Kb 0.0722.
-// Chroma is the mean over the block's pixels; odd sizes repeat the last row or column. Based on:
-// ITU-R BT.601-7 and BT.709-6, section 3.
+// Layout 4:2:0 with chroma in the middle of each 2x2 block ("C420jpeg"), limited range, by the
+// arithmetic of figurine/ycbcr.h. The format has no field for the matrix, so the choice follows
+// what players assume: BT.601 up to 576 rows, BT.709 above. Chroma is that of the block's mean; odd
+// sizes repeat the last row or column.
 #pragma once
 
 #include <array>
