@@ -4,7 +4,7 @@
 
 #include "ports/host/files.h"
 #include "ports/media/png.h"
-#include "samples/figurine/frame_sink.h"
+#include "samples/common/rendered_frame.h"
 
 namespace figurine::samples {
 

@@ -6,7 +6,7 @@
 
 #include "figurine/status.h"
 #include "ports/media/image.h"
-#include "samples/figurine/parse.h"
+#include "samples/common/parse.h"
 
 namespace figurine::samples {
 

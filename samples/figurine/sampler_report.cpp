@@ -7,13 +7,14 @@
 
 #include "figurine/avatar_sampler.h"
 #include "figurine/renderer.h"
+#include "ports/host/clock.h"
 #include "ports/media/png.h"
-#include "samples/figurine/device_options.h"
-#include "samples/figurine/frame_log.h"
-#include "samples/figurine/frame_sink.h"
+#include "samples/common/device_options.h"
+#include "samples/common/frame_log.h"
+#include "samples/common/machine.h"
+#include "samples/common/progress.h"
+#include "samples/common/rendered_frame.h"
 #include "samples/figurine/image_error.h"
-#include "samples/figurine/machine.h"
-#include "samples/figurine/progress.h"
 #include "samples/figurine/report_files.h"
 #include "samples/figurine/report_page.h"
 
@@ -48,12 +49,12 @@ struct Setting {
 
 // A person in the golden pose, drawn from its float weights: the rounding to int8 would hide how
 // the error falls.
-class Portraitist {
+class PersonRenderer {
  public:
-  static Result<std::unique_ptr<Portraitist>> create(const LoadedPackage& package,
-                                                     const std::string& body_option) {
+  static Result<std::unique_ptr<PersonRenderer>> create(const LoadedPackage& package,
+                                                        const std::string& body_option) {
     const Sampler& sampler = package.package.sampler();
-    auto made = std::make_unique<Portraitist>();
+    auto made = std::make_unique<PersonRenderer>();
     Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler);
     if (!device.ok()) return device.status().within(package.path);
     made->sampler_ = std::move(*device);
@@ -71,9 +72,9 @@ class Portraitist {
   // ms: of the sampling alone.
   Result<ports::ImageF32> draw(const SampleRequest& request, double* ms) {
     SampledAvatar person;
-    const uint64_t start_ns = now_ns();
+    const uint64_t start_ns = ports::now_ns();
     FIG_RETURN_IF_ERROR(sampler_->sample(request, person));
-    if (ms != nullptr) *ms = static_cast<double>(now_ns() - start_ns) * 1e-6;
+    if (ms != nullptr) *ms = static_cast<double>(ports::now_ns() - start_ns) * 1e-6;
     Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1});
     if (!renderer.ok()) return renderer.status();
     const Result<AvatarId> id =
@@ -160,9 +161,9 @@ Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs,
 
 Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptions& options) {
   const Sampler& sampler = package.package.sampler();
-  Result<std::unique_ptr<Portraitist>> made = Portraitist::create(package, options.body);
+  Result<std::unique_ptr<PersonRenderer>> made = PersonRenderer::create(package, options.body);
   if (!made.ok()) return made.status();
-  Portraitist& portraitist = **made;
+  PersonRenderer& people = **made;
   std::vector<std::vector<Setting>> settings(std::size(kSolvers),
                                              std::vector<Setting>(std::size(kEvaluations)));
   std::vector<ReportPicture> pictures;
@@ -170,13 +171,13 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   uint64_t done = 0;
   for (uint64_t seed = 0; seed < options.seeds; ++seed) {
     const Result<ports::ImageF32> truth =
-        portraitist.draw({.seed = seed, .steps = kReferenceEvaluations}, nullptr);
+        people.draw({.seed = seed, .steps = kReferenceEvaluations}, nullptr);
     if (!truth.ok()) return truth.status();
     for (size_t s = 0; s < std::size(kEvaluations); ++s) {
       for (size_t m = 0; m < std::size(kSolvers); ++m) {
         FIG_RETURN_IF_ERROR(check_interrupt());
         double ms = 0;
-        const Result<ports::ImageF32> picture = portraitist.draw(
+        const Result<ports::ImageF32> picture = people.draw(
             {.seed = seed, .steps = kEvaluations[s], .method = kSolvers[m].method}, &ms);
         if (!picture.ok()) return picture.status();
         add_foreground_error(*truth, *picture, settings[m][s].error);
@@ -199,7 +200,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   }
 
   Json json = json_header("report");
-  json["date"] = date_utc();
+  json["date"] = ports::date_utc();
   json["machine"] = {{"cpu", cpu_name()},
                      {"cpus", usable_cpus()},
                      {"threads", 1},
@@ -207,7 +208,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
                      {"isa", "scalar"}};
   json["sampler"] = package.path;
   json["seeds"] = options.seeds;
-  json["size"] = {portraitist.golden().camera.width_px, portraitist.golden().camera.height_px};
+  json["size"] = {people.golden().camera.width_px, people.golden().camera.height_px};
   json["reference"] = {
       {"evaluations", kReferenceEvaluations},
       {"meaning", "the same seeds in 500 evaluations of DPM-Solver++(2M) by the same integers"}};
@@ -222,7 +223,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   json["dials"] = Json::array();
   for (size_t m = 0; m < std::size(kSolvers); ++m) {
     json["dials"].push_back(
-        dial_json(kSolvers[m], sampler, portraitist.sampler().macs_per_evaluation(), settings[m]));
+        dial_json(kSolvers[m], sampler, people.sampler().macs_per_evaluation(), settings[m]));
   }
   FIG_RETURN_IF_ERROR(write_report(options.output, json, report_html(json, pictures)));
   if (options.json) print_json(json);

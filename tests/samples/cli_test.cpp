@@ -8,7 +8,7 @@
 #include "ports/media/pfm.h"
 #include "ports/media/png.h"
 #include "runtime/test_packages.h"
-#include "samples/figurine/camera_spec.h"
+#include "samples/common/camera_spec.h"
 #include "samples/figurine/image_error.h"
 #include "samples/ply_text.h"
 #include "samples/program.h"

@@ -1,4 +1,4 @@
-#include "samples/figurine/progress.h"
+#include "samples/common/progress.h"
 
 #include <unistd.h>
 

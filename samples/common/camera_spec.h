@@ -8,7 +8,7 @@
 
 #include "figurine/camera.h"
 #include "figurine/status.h"
-#include "samples/figurine/parse.h"
+#include "samples/common/parse.h"
 
 namespace figurine::samples {
 

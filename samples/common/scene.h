@@ -1,4 +1,5 @@
-// The figures of a picture: avatars with their bodies, motions and places, and each frame's poses.
+// The figures of a picture: avatars with their bodies, their poses and places, and what all of them
+// do at a moment.
 #pragma once
 
 #include <array>
@@ -9,12 +10,13 @@
 #include <vector>
 
 #include "figurine/renderer.h"
-#include "samples/figurine/loading.h"
-#include "samples/figurine/parse.h"
+#include "samples/common/loading.h"
+#include "samples/common/parse.h"
+#include "samples/common/pose_source.h"
 
 namespace figurine::samples {
 
-struct CastOptions {
+struct SceneOptions {
   std::vector<std::string> avatars;
   std::string body;                  // empty: found by content hash
   std::vector<std::string> motions;  // none: the golden pose; one for all, or one for each avatar
@@ -22,17 +24,17 @@ struct CastOptions {
   std::vector<std::string> places;   // "X,Z[,HEADING]" for each avatar, or none
 };
 
-class Cast {
+class Scene {
  public:
   // Loads and checks everything; nothing later can fail on data.
-  static Result<Cast> load(const CastOptions& options);
+  static Result<Scene> load(const SceneOptions& options);
 
-  size_t size() const { return members_.size(); }
+  size_t size() const { return figures_.size(); }
   bool moves() const { return frame_count_ > 1; }
   uint32_t frame_count() const { return frame_count_; }  // of the shortest motion; 1 without
   float frames_per_second() const { return frames_per_second_; }
-  const LoadedAvatar& avatar(size_t member) const { return *members_[member].avatar; }
-  const LoadedPackage& body(size_t member) const { return *members_[member].body; }
+  const LoadedAvatar& avatar(size_t figure) const { return *figures_[figure].avatar; }
+  const LoadedPackage& body(size_t figure) const { return *figures_[figure].body; }
   // The frames of the range that exist. kInvalidArgument if it reaches beyond the motion.
   Result<std::vector<uint32_t>> frames(const FrameRange& range) const;
 
@@ -43,31 +45,41 @@ class Cast {
   std::string precision(const Renderer& renderer) const;
   // Whether every avatar holds it.
   bool holds(Precision precision) const;
-  // Everybody's pose in a frame of the motion, at their places; valid until the next call.
-  // Allocates nothing.
-  std::span<const FrameAvatar> pose(uint32_t frame);
-  // The same for a made-up moment of a cast without motion: every joint sways a few degrees about
-  // its pose, differently at each moment.
-  std::span<const FrameAvatar> sway(uint32_t moment);
 
-  // World position of a member's root joint in the last pose.
-  std::array<float, 3> root_m(size_t member) const;
-  // Where a member looks in the last pose, in degrees about the vertical: 0 is +z, positive towards
+  // Everybody's pose, at their places, in three ways; each valid until the next call of any, and
+  // none allocates. In a frame of the motions, each by its own rate:
+  std::span<const FrameAvatar> pose(uint32_t frame);
+  // At a made-up moment of a scene without motion: swaying about the pose of frame 0.
+  std::span<const FrameAvatar> sway(uint32_t moment);
+  // At a time, from the figures' sources. Error: a source has ended.
+  Result<std::span<const FrameAvatar>> pose_at(double time_s);
+  // A figure's source for pose_at(); at first its motion, or its golden pose.
+  void set_source(size_t figure, std::unique_ptr<PoseSource> source);
+
+  // World position of a figure's root joint in the last pose.
+  std::array<float, 3> root_m(size_t figure) const;
+  // Where a figure looks in the last pose, in degrees about the vertical: 0 is +z, positive towards
   // +x.
-  float heading_deg(size_t member) const;
+  float heading_deg(size_t figure) const;
 
  private:
-  struct Member {
+  struct Figure {
     std::shared_ptr<LoadedAvatar> avatar;
     std::shared_ptr<LoadedPackage> body, motion;
     Placement place;
     std::array<float, 3> rest_root_m{0, 0, 0};  // of the template that the Gaussians sit on
-    std::vector<float> rotations;               // [J,4] of the last pose
+    std::unique_ptr<PoseSource> source, swaying;
+    std::vector<float> rotations;  // [J,4] of the last pose
     std::array<float, 3> root_translation_m{0, 0, 0};
-  };
-  void place_member(size_t member, const PoseView& pose);
 
-  std::vector<Member> members_;
+    // Without motion the golden pose, whatever the frame.
+    PoseView recorded_pose(uint32_t frame) const;
+  };
+  static Result<Figure> load_figure(const SceneOptions& options, size_t index,
+                                    std::span<const Figure> others);
+  void place_figure(size_t figure, const PoseView& pose);
+
+  std::vector<Figure> figures_;
   std::vector<FrameAvatar> posed_;
   uint32_t frame_count_ = 1;
   float frames_per_second_ = 30;

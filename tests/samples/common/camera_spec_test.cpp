@@ -1,5 +1,5 @@
 // --camera: orbits and JSON files, and everything that is refused with the field's name.
-#include "samples/figurine/camera_spec.h"
+#include "samples/common/camera_spec.h"
 
 #include <gtest/gtest.h>
 

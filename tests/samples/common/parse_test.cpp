@@ -1,5 +1,5 @@
 // The small languages of the command line: what they accept, what it means, and what they refuse.
-#include "samples/figurine/parse.h"
+#include "samples/common/parse.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The default camera: what it must hold is inside the picture, and it does not stand further away
 // than that needs.
-#include "samples/figurine/framing.h"
+#include "samples/common/framing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,8 @@
-#include "samples/figurine/machine.h"
+#include "samples/common/machine.h"
 
 #include <sched.h>
 
-#include <chrono>
 #include <cstdlib>
-#include <ctime>
 #include <fstream>
 
 namespace figurine::samples {
@@ -26,12 +24,6 @@ std::string proc_value(const char* path, const std::string& key) {
 
 }  // namespace
 
-uint64_t now_ns() {
-  return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                   std::chrono::steady_clock::now().time_since_epoch())
-                                   .count());
-}
-
 uint32_t usable_cpus() {
   cpu_set_t set;
   CPU_ZERO(&set);
@@ -49,14 +41,6 @@ std::string cpu_name() {
 
 uint64_t peak_memory_bytes() {
   return std::strtoull(proc_value("/proc/self/status", "VmHWM").c_str(), nullptr, 10) * 1024;
-}
-
-std::string date_utc() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  ::gmtime_r(&now, &parts);
-  char text[32];
-  return std::string(text, std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", &parts));
 }
 
 }  // namespace figurine::samples

@@ -1,7 +1,9 @@
-#include "samples/figurine/framing.h"
+#include "samples/common/framing.h"
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 namespace figurine::samples {
 
@@ -26,12 +28,11 @@ float fit_distance_m(std::span<const Point> points, const OrbitCamera& orbit, do
                      const FramingOptions& options) {
   constexpr double kRadians = 3.14159265358979323846 / 180;
   const double azimuth = orbit.azimuth_deg * kRadians, elevation = orbit.elevation_deg * kRadians;
-  const double toward[3] = {std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
-                            std::cos(azimuth) * std::cos(elevation)};
-  const double right[3] = {std::cos(azimuth), 0, -std::sin(azimuth)};
-  const double up[3] = {toward[1] * right[2] - toward[2] * right[1],
-                        toward[2] * right[0] - toward[0] * right[2],
-                        toward[0] * right[1] - toward[1] * right[0]};
+  const glm::dvec3 toward(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
+                          std::cos(azimuth) * std::cos(elevation));
+  const glm::dvec3 right(std::cos(azimuth), 0, -std::sin(azimuth));
+  const glm::dvec3 up = glm::cross(toward, right);
+  const glm::vec3 target(orbit.target_m[0], orbit.target_m[1], orbit.target_m[2]);
   const double tangent_y = std::tan(0.5 * orbit.vertical_fov_deg * kRadians) * (1 - options.margin);
   const double tangent_x =
       std::tan(0.5 * orbit.vertical_fov_deg * kRadians) * aspect * (1 - options.margin);
@@ -40,13 +41,8 @@ float fit_distance_m(std::span<const Point> points, const OrbitCamera& orbit, do
   std::vector<float> needed;
   for (const Point& point : points) {
     if (!finite(point)) continue;
-    double x = 0, y = 0, t = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double d = point[k] - orbit.target_m[k];
-      x += right[k] * d;
-      y += up[k] * d;
-      t += toward[k] * d;
-    }
+    const glm::dvec3 d(glm::vec3(point[0], point[1], point[2]) - target);
+    const double x = glm::dot(right, d), y = glm::dot(up, d), t = glm::dot(toward, d);
     needed.push_back(
         static_cast<float>(t + std::max(std::abs(x) / tangent_x, std::abs(y) / tangent_y)));
   }

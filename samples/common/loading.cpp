@@ -1,4 +1,4 @@
-#include "samples/figurine/loading.h"
+#include "samples/common/loading.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,11 +1,12 @@
-#include "samples/figurine/device_options.h"
+#include "samples/common/device_options.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "samples/figurine/machine.h"
+#include "ports/host/clock.h"
+#include "samples/common/machine.h"
 
 namespace figurine::samples {
 
@@ -28,7 +29,7 @@ Result<RendererOptions> DeviceOptions::renderer_options() const {
     return Status(StatusCode::kUnsupported,
                   "isa '" + isa + "' is unsupported in this build; it has scalar");
   return RendererOptions{.threads = threads != 0 ? threads : std::min(usable_cpus(), 8u),
-                         .now_ns = now_ns};
+                         .now_ns = ports::now_ns};
 }
 
 std::optional<Precision> DeviceOptions::network_precision() const {

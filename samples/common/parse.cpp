@@ -1,4 +1,4 @@
-#include "samples/figurine/parse.h"
+#include "samples/common/parse.h"
 
 #include <charconv>
 #include <cmath>

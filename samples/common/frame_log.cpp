@@ -1,4 +1,4 @@
-#include "samples/figurine/frame_log.h"
+#include "samples/common/frame_log.h"
 
 #include <algorithm>
 #include <cmath>

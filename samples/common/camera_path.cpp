@@ -1,9 +1,9 @@
-#include "samples/figurine/rig.h"
+#include "samples/common/camera_path.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "samples/figurine/framing.h"
+#include "samples/common/framing.h"
 
 namespace figurine::samples {
 
@@ -19,39 +19,39 @@ constexpr float kDefaultElevation_deg = 6;
 constexpr float kDefaultFov_deg = 35;
 
 // Mean ground position of everybody in each frame.
-std::vector<std::array<float, 2>> ground_path(std::span<const uint32_t> frames, Cast& cast) {
+std::vector<std::array<float, 2>> ground_path(std::span<const uint32_t> frames, Scene& scene) {
   std::vector<std::array<float, 2>> path;
   for (const uint32_t frame : frames) {
-    cast.pose(frame);
+    scene.pose(frame);
     std::array<float, 2> mean{0, 0};
-    for (size_t m = 0; m < cast.size(); ++m) {
-      mean[0] += cast.root_m(m)[0] / static_cast<float>(cast.size());
-      mean[1] += cast.root_m(m)[2] / static_cast<float>(cast.size());
+    for (size_t m = 0; m < scene.size(); ++m) {
+      mean[0] += scene.root_m(m)[0] / static_cast<float>(scene.size());
+      mean[1] += scene.root_m(m)[2] / static_cast<float>(scene.size());
     }
     path.push_back(mean);
   }
   return path;
 }
 
-// The direction in which most of the cast looks.
-float mean_heading_deg(const Cast& cast) {
+// The direction in which most of the scene looks.
+float mean_heading_deg(const Scene& scene) {
   double x = 0, z = 0;
-  for (size_t m = 0; m < cast.size(); ++m) {
-    x += std::sin(cast.heading_deg(m) * kRadians);
-    z += std::cos(cast.heading_deg(m) * kRadians);
+  for (size_t m = 0; m < scene.size(); ++m) {
+    x += std::sin(scene.heading_deg(m) * kRadians);
+    z += std::cos(scene.heading_deg(m) * kRadians);
   }
   return static_cast<float>(std::atan2(x, z) / kRadians);
 }
 
 // Centres of the Gaussians that can be seen in a few of the frames, relative to path.
 Result<std::vector<Point>> sample_points(std::span<const uint32_t> frames,
-                                         std::span<const std::array<float, 2>> path, Cast& cast,
+                                         std::span<const std::array<float, 2>> path, Scene& scene,
                                          Renderer& renderer) {
   std::vector<Point> points;
   const size_t samples = std::min(kFramingFrames, frames.size());
   for (size_t s = 0; s < samples; ++s) {
     const size_t at = samples == 1 ? 0 : s * (frames.size() - 1) / (samples - 1);
-    for (const FrameAvatar& member : cast.pose(frames[at])) {
+    for (const FrameAvatar& member : scene.pose(frames[at])) {
       const Result<GaussianView> gaussians = renderer.pose_avatar(member.avatar, member.pose);
       if (!gaussians.ok()) return gaussians.status();
       for (uint32_t i = 0; i < gaussians->count; ++i) {
@@ -66,10 +66,10 @@ Result<std::vector<Point>> sample_points(std::span<const uint32_t> frames,
 
 }  // namespace
 
-Result<std::vector<Camera>> place_cameras(const RigOptions& options,
-                                          std::span<const uint32_t> frames, Cast& cast,
-                                          Renderer& renderer) {
-  const Camera& golden = cast.avatar(0).avatar.golden.camera;
+Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
+                                             std::span<const uint32_t> frames, Scene& scene,
+                                             Renderer& renderer) {
+  const Camera& golden = scene.avatar(0).avatar.golden.camera;
   if (options.camera.fixed) {
     Camera camera = *options.camera.fixed;
     ImageSize size{camera.width_px, camera.height_px};
@@ -85,10 +85,10 @@ Result<std::vector<Camera>> place_cameras(const RigOptions& options,
   std::vector<std::array<float, 2>> path(
       frames.size(), {0, 0});  // an orbit that stays sees the path in world coordinates
   if (options.follow)
-    path =
-        smooth_path(ground_path(frames, cast), kFollowSigma_s * cast.frames_per_second() /
-                                                   (frames.size() > 1 ? frames[1] - frames[0] : 1));
-  const Result<std::vector<Point>> points = sample_points(frames, path, cast, renderer);
+    path = smooth_path(ground_path(frames, scene),
+                       kFollowSigma_s * scene.frames_per_second() /
+                           (frames.size() > 1 ? frames[1] - frames[0] : 1));
+  const Result<std::vector<Point>> points = sample_points(frames, path, scene, renderer);
   if (!points.ok()) return points.status();
 
   FramingOptions framing;
@@ -96,8 +96,8 @@ Result<std::vector<Camera>> place_cameras(const RigOptions& options,
   OrbitCamera orbit = options.camera.orbit.value_or(OrbitCamera{});
   orbit.target_m = options.follow ? Point{0, centre[1], 0} : centre;
   if (!options.camera.orbit) {
-    cast.pose(frames[0]);
-    orbit.azimuth_deg = mean_heading_deg(cast) + kDefaultTurn_deg;
+    scene.pose(frames[0]);
+    orbit.azimuth_deg = mean_heading_deg(scene) + kDefaultTurn_deg;
     orbit.elevation_deg = kDefaultElevation_deg;
     orbit.vertical_fov_deg = kDefaultFov_deg;
     orbit.distance_m = fit_distance_m(*points, orbit, aspect, framing);

@@ -1,4 +1,4 @@
-#include "samples/figurine/camera_spec.h"
+#include "samples/common/camera_spec.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
