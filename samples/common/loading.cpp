@@ -26,6 +26,36 @@ std::vector<std::string> packages_in(const std::string& folder) {
   return paths;
 }
 
+// The folders beside a folder, itself not among them, that hold packages; in the order of their
+// names. None if the folder above cannot be read.
+std::vector<std::string> siblings_of(const std::filesystem::path& folder) {
+  std::vector<std::string> siblings;
+  std::error_code error;
+  const std::filesystem::path above = (folder / "..").lexically_normal();
+  for (std::filesystem::directory_iterator entry(above, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code unreadable;
+    if (!entry->is_directory(unreadable) ||
+        std::filesystem::equivalent(entry->path(), folder, unreadable))
+      continue;
+    if (!packages_in(entry->path().string()).empty()) siblings.push_back(entry->path().string());
+  }
+  std::sort(siblings.begin(), siblings.end());
+  return siblings;
+}
+
+// The package's own folder, then those of FIGURINE_PATH.
+std::vector<std::string> first_body_folders(const std::filesystem::path& own) {
+  std::vector<std::string> folders = {own.string()};
+  if (const char* search = std::getenv("FIGURINE_PATH"); search != nullptr) {
+    std::istringstream list(search);
+    for (std::string part; std::getline(list, part, ':');) {
+      if (!part.empty()) folders.push_back(part);
+    }
+  }
+  return folders;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path) {
@@ -114,43 +144,56 @@ Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar,
   return find_body(avatar.avatar, avatar.name, avatar.package->path, body_option);
 }
 
-Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& wanted, const std::string& name,
-                                                 const std::string& beside,
-                                                 const std::string& body_option) {
-  if (!body_option.empty()) {
-    Result<std::unique_ptr<LoadedPackage>> body = load_package(body_option, PackageKind::kBody);
-    if (!body.ok()) return body;
-    const Status fits = check_avatar_fits_body(wanted, (*body)->package);
-    if (!fits.ok()) return fits.within(name + " on " + body_option);
-    return body;
-  }
-  const std::filesystem::path folder = std::filesystem::path(beside).parent_path();
-  std::vector<std::string> folders = {folder.empty() ? "." : folder.string()};
-  if (const char* search = std::getenv("FIGURINE_PATH"); search != nullptr) {
-    std::istringstream list(search);
-    for (std::string part; std::getline(list, part, ':');) {
-      if (!part.empty()) folders.push_back(part);
-    }
-  }
-  std::string others, looked_in;
-  for (const std::string& place : folders) {
-    looked_in += (looked_in.empty() ? "" : ", ") + place;
-    for (const std::string& path : packages_in(place)) {
+namespace {
+
+// A search for one body, and what it has met: for the message if it fails.
+struct BodySearch {
+  const Avatar& wanted;
+  std::string looked_in, others;
+
+  // Null if the body is not among the folder's packages.
+  std::unique_ptr<LoadedPackage> look_in(const std::string& folder) {
+    looked_in += (looked_in.empty() ? "" : ", ") + folder;
+    for (const std::string& path : packages_in(folder)) {
       Result<std::unique_ptr<LoadedPackage>> candidate = load_package(path);
       if (!candidate.ok() || (*candidate)->package.kind() != PackageKind::kBody) continue;
-      if ((*candidate)->package.content_hash() == wanted.body_hash) {
-        const Status fits = check_avatar_fits_body(wanted, (*candidate)->package);
-        if (!fits.ok()) return fits.within(name + " on " + path);
-        return candidate;
-      }
+      if ((*candidate)->package.content_hash() == wanted.body_hash) return std::move(*candidate);
       others += (others.empty() ? "" : ", ") + path + " is " +
                 format_hash((*candidate)->package.content_hash());
     }
+    return nullptr;
   }
-  return Status(others.empty() ? StatusCode::kNotFound : StatusCode::kMismatch,
+};
+
+}  // namespace
+
+Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& wanted, const std::string& name,
+                                                 const std::string& beside,
+                                                 const std::string& body_option) {
+  const auto checked = [&](std::unique_ptr<LoadedPackage> body) {
+    const Status fits = check_avatar_fits_body(wanted, body->package);
+    return fits.ok() ? Result(std::move(body)) : fits.within(name + " on " + body->path);
+  };
+  if (!body_option.empty()) {
+    Result<std::unique_ptr<LoadedPackage>> body = load_package(body_option, PackageKind::kBody);
+    return body.ok() ? checked(std::move(*body)) : std::move(body);
+  }
+  std::filesystem::path own = std::filesystem::path(beside).parent_path();
+  if (own.empty()) own = ".";
+  BodySearch search{wanted, {}, {}};
+  for (const std::string& folder : first_body_folders(own)) {
+    if (std::unique_ptr<LoadedPackage> body = search.look_in(folder))
+      return checked(std::move(body));
+  }
+  for (const std::string& folder : siblings_of(own)) {
+    if (std::unique_ptr<LoadedPackage> body = search.look_in(folder))
+      return checked(std::move(body));
+  }
+  const bool none = search.others.empty();
+  return Status(none ? StatusCode::kNotFound : StatusCode::kMismatch,
                 name + ": body: needs " + format_hash(wanted.body_hash) + " (" + wanted.body_name +
-                    "); looked in " + looked_in +
-                    (others.empty() ? "; no body there" : "; found others: " + others));
+                    "); looked in " + search.looked_in +
+                    (none ? "; no body there" : "; found others: " + search.others));
 }
 
 }  // namespace figurine::samples

@@ -39,7 +39,8 @@ struct LoadedAvatar {
 Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name);
 
 // The body that an avatar was made for: body_option if given (it must be the right one), else the
-// .fgn files beside the avatar, else those of the folders in FIGURINE_PATH (colon-separated). Found
+// .fgn files beside the avatar, else those of the folders in FIGURINE_PATH (colon-separated), else
+// those of the folders beside the avatar's own (samplers/x.fgn stands on populations/y.fgn). Found
 // by content hash, whatever the file is called. Errors name the hash that is wanted and the hashes
 // that were found.
 Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar,

@@ -64,9 +64,9 @@ Command add_export_command(CLI::App& app) {
           "avatar", options->scene.avatars[0],
           "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->scene.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
   command
       ->add_option("--motion", options->scene.motions, "motion package; default: the golden pose")
       ->expected(1);

@@ -177,9 +177,9 @@ Command add_render_command(CLI::App& app) {
           "avatars", options->scene.avatars,
           "avatar packages (.fgn), or members of populations (people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->scene.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
   command
       ->add_option("--motion", options->scene.motions,
                    "motion packages: one for all avatars, or one for each")

@@ -271,9 +271,9 @@ Command add_sample_command(CLI::App& app) {
                    "what the avatar holds: fixed point, float weights, or both")
       ->check(CLI::IsMember({"q8", "f32", "f32,q8"}))
       ->capture_default_str();
-  command->add_option(
-      "--body", options->body,
-      "body package; default: found by content hash beside the sampler, then in FIGURINE_PATH");
+  command->add_option("--body", options->body,
+                      "body package; default: found by content hash beside the sampler, in "
+                      "FIGURINE_PATH, in the folders beside");
   command->add_option("--name", options->name,
                       "of the avatar; default: the sampler's name and the seed");
   command->add_option(

@@ -272,9 +272,9 @@ Command add_selftest_command(CLI::App& app) {
                    "avatar or sampler package (.fgn), or a member of a population "
                    "(people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->scene.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
   options->device.add_to(*command);
   return {command, [options] { return run_selftest(*options); }};
 }

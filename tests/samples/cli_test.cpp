@@ -522,17 +522,30 @@ TEST_F(Cli, RenderJsonHasWhatTheDemoNeeds) {
 }
 
 TEST_F(Cli, BodiesAreFoundByContentHash) {
-  // Beside the avatar, under any name; in FIGURINE_PATH; by --body.
+  // By --body; in FIGURINE_PATH; in a folder beside the avatar's; beside the avatar, under any
+  // name.
   TestFolder apart;
-  std::filesystem::copy(packages_->path("avatar.fgn"), apart.path("avatar.fgn"));
-  const std::string render = "render '" + apart.path("avatar.fgn") + "' --size 16x16 -o x.png";
+  const std::string own = apart.path("own/"), bodies = apart.path("bodies/");
+  std::filesystem::create_directories(own);
+  std::filesystem::create_directories(bodies);
+  std::filesystem::copy(packages_->path("avatar.fgn"), own + "avatar.fgn");
+  const std::string render = "render '" + own + "avatar.fgn' --size 16x16 -o x.png";
   ProgramRun result = run(render);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_NE(result.err.find("body: needs "), std::string::npos) << result.err;
+  EXPECT_EQ(run(render + " --body P/body.fgn").exit_code, 0);
   EXPECT_EQ(run(render, {.environment = "FIGURINE_PATH=/nowhere:" + packages_->path()}).exit_code,
             0);
-  EXPECT_EQ(run(render + " --body P/body.fgn").exit_code, 0);
-  std::filesystem::copy(packages_->path("body.fgn"), apart.path("anything.fgn"));
+  std::filesystem::copy(packages_->path("other_body.fgn"), bodies + "anything.fgn");
+  result = run(render);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.err.find("found others: " + bodies + "anything.fgn is "), std::string::npos)
+      << result.err;
+  std::filesystem::copy(packages_->path("body.fgn"), bodies + "something.fgn");
+  EXPECT_EQ(run(render).exit_code, 0);
+  std::filesystem::remove_all(bodies);
+  EXPECT_EQ(run(render).exit_code, 1);
+  std::filesystem::copy(packages_->path("body.fgn"), own + "anything.fgn");
   EXPECT_EQ(run(render).exit_code, 0);
 }
 
