@@ -278,6 +278,7 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
                                  {"theory", dial.theory}};
   if (dial.theoretical_order) json["theoretical_order"] = *dial.theoretical_order;
   json["observed_order"] = overall_order(dial, measurements);
+  json["observed_over"] = "all settings, by least squares";
   json["stages"] = nlohmann::ordered_json::array();
   for (const Stage stage : dial.stages) json["stages"].push_back(to_string(stage));
   json["settings"] = nlohmann::ordered_json::array();
@@ -406,9 +407,9 @@ Command add_report_command(CLI::App& app) {
                    "avatar or sampler package (.fgn), or a member of a population "
                    "(people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->scene.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
   command
       ->add_option("--motion", options->scene.motions,
                    "motion package; default: the golden pose, swaying")

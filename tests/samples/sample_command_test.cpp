@@ -3,7 +3,10 @@
 // without a file.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
 
 #include "formats/writer/sampler_writer.h"
 #include "ports/host/files.h"
@@ -141,6 +144,26 @@ TEST_F(SampleCommand, GoldenSeedsAreHeldAgainstThisDevice) {
   EXPECT_EQ(wrong.error_lines(), 1u);
 }
 
+// The dial's order is the slope over the three finest settings that stand above its noise floor.
+void expect_order_above_the_floor(const nlohmann::json& dial) {
+  const double floor = dial.at("noise_floor");
+  std::vector<std::pair<double, double>> above;  // log step, log error; up to the finest above
+  std::vector<std::pair<double, double>> all;
+  for (const nlohmann::json& setting : dial.at("settings")) {
+    const double rmse = setting.at("rmse");
+    EXPECT_GE(rmse, floor);
+    all.emplace_back(std::log(setting.at("value").get<double>()), std::log(rmse));
+    if (rmse > 4 * floor) above = all;
+  }
+  ASSERT_GE(above.size(), 3u) << dial.dump();
+  const auto [coarse_step, coarse_error] = above[above.size() - 3];
+  const auto [fine_step, fine_error] = above.back();
+  EXPECT_NEAR(dial.at("observed_order").get<double>(),
+              (coarse_error - fine_error) / (coarse_step - fine_step), 1e-9);
+  EXPECT_NE(dial.at("observed_over").get<std::string>().find("above the noise floor"),
+            std::string::npos);
+}
+
 TEST_F(SampleCommand, TheReportHasADialForEachSolver) {
   const ProgramRun result = run("report crowd.fgn --seeds 2 -o report --json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -155,10 +178,19 @@ TEST_F(SampleCommand, TheReportHasADialForEachSolver) {
     EXPECT_LT(settings.back().at("rmse").get<double>(), settings.front().at("rmse").get<double>());
     EXPECT_GT(settings.back().at("work").at("macs").get<uint64_t>(),
               settings.front().at("work").at("macs").get<uint64_t>());
+    expect_order_above_the_floor(dial);
   }
   EXPECT_NE(folder_.read("report/report.html").find("seed 0, the reference"), std::string::npos);
   EXPECT_EQ(run("report crowd.fgn --body other_body.fgn -o nowhere").exit_code, 1);
   EXPECT_FALSE(folder_.has("nowhere"));
+}
+
+// As it lies in a checkout: the sampler's body is in the folder of its population.
+TEST_F(SampleCommand, TheShippedSamplerFindsItsBody) {
+  const ProgramRun result =
+      run("sample '" FIGURINE_SOURCE_DIR "/samples/samplers/edge.fgn' --seed 7 --steps 1 -o x.fgn");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(folder_.has("x.fgn"));
 }
 
 TEST_F(SampleCommand, BadInputGetsOneLineAndNoFile) {
