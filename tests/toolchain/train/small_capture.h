@@ -50,7 +50,7 @@ struct SmallCapture {
     capture::capture_identities({.output = folder.path("capture"),
                                  .seed = 5,
                                  .frames = 32,
-                                 .rig = {.views = 8, .width_px = 128, .height_px = 128},
+                                 .cameras = {.views = 8, .width_px = 128, .height_px = 128},
                                  .threads = 2,
                                  .tool = "test",
                                  .sources = {"swinging: made by the test"}},

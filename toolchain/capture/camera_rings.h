@@ -10,7 +10,7 @@
 
 namespace figurine::capture {
 
-struct RigOptions {
+struct CameraRingsOptions {
   uint32_t views = 24;
   uint32_t width_px = 512;
   uint32_t height_px = 512;
@@ -18,7 +18,7 @@ struct RigOptions {
   float margin = 0.04f;  // of the image's half size left free around the outermost point
 };
 
-struct RigCamera {
+struct RingCamera {
   std::string name;  // "C01", ...
   uint32_t number =
       1;  // as in the extrinsics' keys; never 41, which readers of MVHumanNet leave out
@@ -28,6 +28,7 @@ struct RigCamera {
 // Up to three rings (below, level, above), azimuths staggered from ring to ring. One distance for
 // all: the nearest at which every point of `points` is inside every image with the margin. points:
 // places that the figure reaches in any pose, world, at least one.
-std::vector<RigCamera> make_rig(const RigOptions& options, const std::vector<Vec3>& points);
+std::vector<RingCamera> make_camera_rings(const CameraRingsOptions& options,
+                                          const std::vector<Vec3>& points);
 
 }  // namespace figurine::capture

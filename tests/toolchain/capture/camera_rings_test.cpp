@@ -1,4 +1,4 @@
-#include "toolchain/capture/rig.h"
+#include "toolchain/capture/camera_rings.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,12 +22,12 @@ std::vector<Vec3> box() {
   return points;
 }
 
-TEST(Rig, HoldsEveryPointAndFillsTheImage) {
+TEST(CameraRings, HoldsEveryPointAndFillsTheImage) {
   for (uint32_t views : {1u, 4u, 24u, 48u}) {
-    const std::vector<RigCamera> rig = make_rig({.views = views}, box());
-    ASSERT_EQ(rig.size(), views);
+    const std::vector<RingCamera> cameras = make_camera_rings({.views = views}, box());
+    ASSERT_EQ(cameras.size(), views);
     float reach = 0;
-    for (const RigCamera& entry : rig) {
+    for (const RingCamera& entry : cameras) {
       const auto& m = entry.camera.view_from_world;
       for (const Vec3& p : box()) {
         const float z = m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11];
@@ -41,9 +41,10 @@ TEST(Rig, HoldsEveryPointAndFillsTheImage) {
   }
 }
 
-TEST(Rig, NoCameraIsCalled41) {
+TEST(CameraRings, NoCameraIsCalled41) {
   std::set<uint32_t> numbers;
-  for (const RigCamera& entry : make_rig({.views = 60}, box())) numbers.insert(entry.number);
+  for (const RingCamera& entry : make_camera_rings({.views = 60}, box()))
+    numbers.insert(entry.number);
   EXPECT_EQ(numbers.size(), 60u);
   EXPECT_EQ(numbers.count(41), 0u);
 }

@@ -15,7 +15,7 @@
 
 namespace figurine::evaluate {
 
-struct PosedStudioOptions {
+struct PosedMembersOptions {
   const Motion* motion =
       nullptr;            // whose poses are drawn; without: golden poses of training members
   size_t first_pose = 0;  // of fixed_poses(first_pose + poses)
@@ -28,11 +28,11 @@ struct PosedStudioOptions {
 // Members of one part, in the population's order.
 std::vector<size_t> members_of(const Population& population, Split split);
 
-class PosedStudio {
+class PosedMembers {
  public:
   // Both packages are borrowed. Throws InputError if they do not fit, or if nothing can be seen;
   // Interrupted.
-  PosedStudio(const Package& population, const Package& body, const PosedStudioOptions& options);
+  PosedMembers(const Package& population, const Package& body, const PosedMembersOptions& options);
 
   size_t shots() const { return options_.poses * options_.views; }
   size_t pose_of(size_t shot) const { return shot / options_.views; }
@@ -45,9 +45,9 @@ class PosedStudio {
 
  private:
   const Population* population_;
-  PosedStudioOptions options_;
+  PosedMembersOptions options_;
   uint32_t picture_px_;
-  std::optional<Studio> studio_;
+  std::optional<ShotRenderer> renderer_;
 };
 
 }  // namespace figurine::evaluate

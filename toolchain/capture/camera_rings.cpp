@@ -1,4 +1,4 @@
-#include "toolchain/capture/rig.h"
+#include "toolchain/capture/camera_rings.h"
 
 #include <algorithm>
 #include <array>
@@ -15,9 +15,9 @@ constexpr uint32_t kLeftOutNumber = 41;
 
 // Largest |image coordinate| of a point over all cameras, 1 at the border; a point behind a camera
 // counts as outside.
-float reach(const std::vector<RigCamera>& rig, const std::vector<Vec3>& points) {
+float reach(const std::vector<RingCamera>& cameras, const std::vector<Vec3>& points) {
   float worst = 0;
-  for (const RigCamera& entry : rig) {
+  for (const RingCamera& entry : cameras) {
     const Camera& c = entry.camera;
     const auto& m = c.view_from_world;
     for (const Vec3& p : points) {
@@ -33,7 +33,8 @@ float reach(const std::vector<RigCamera>& rig, const std::vector<Vec3>& points) 
 
 }  // namespace
 
-std::vector<RigCamera> make_rig(const RigOptions& options, const std::vector<Vec3>& points) {
+std::vector<RingCamera> make_camera_rings(const CameraRingsOptions& options,
+                                          const std::vector<Vec3>& points) {
   Vec3 low = points.at(0), high = points.at(0);
   for (const Vec3& p : points) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
@@ -41,7 +42,7 @@ std::vector<RigCamera> make_rig(const RigOptions& options, const std::vector<Vec
   }
   const uint32_t rings = options.views >= 6 ? 3 : 1;
   const auto place = [&](float distance_m) {
-    std::vector<RigCamera> rig;
+    std::vector<RingCamera> cameras;
     for (uint32_t i = 0; i < options.views; ++i) {
       const uint32_t ring = i * rings / options.views;
       const uint32_t first = (ring * options.views + rings - 1) / rings,
@@ -55,16 +56,16 @@ std::vector<RigCamera> make_rig(const RigOptions& options, const std::vector<Vec
       orbit.distance_m = distance_m;
       orbit.vertical_fov_deg = options.vertical_fov_deg;
       orbit.target_m = {0, (low.y + high.y) / 2, 0};
-      RigCamera entry;
+      RingCamera entry;
       entry.camera =
           value_or_throw(make_orbit_camera(orbit, options.width_px, options.height_px), "--views");
       entry.number = i + 1 < kLeftOutNumber ? i + 1 : i + 2;
       char name[16];
       std::snprintf(name, sizeof name, "C%02u", entry.number);
       entry.name = name;
-      rig.push_back(std::move(entry));
+      cameras.push_back(std::move(entry));
     }
-    return rig;
+    return cameras;
   };
   float near_m = 0.3f, far_m = 50;
   for (int i = 0; i < 40; ++i) {

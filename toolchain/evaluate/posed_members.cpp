@@ -1,4 +1,4 @@
-#include "toolchain/evaluate/posed_studio.h"
+#include "toolchain/evaluate/posed_members.h"
 
 #include <algorithm>
 
@@ -15,7 +15,7 @@ constexpr float kMargin = 0.06f;
 constexpr float kLowest_deg = -5, kHighest_deg = 25;
 enum Stream : uint64_t { kTurn = 101, kElevation = 102 };  // not those of the network
 
-std::vector<Shot> scatter_shots(const PosedStudioOptions& options) {
+std::vector<Shot> scatter_shots(const PosedMembersOptions& options) {
   std::vector<Shot> shots;
   for (size_t pose = 0; pose < options.poses; ++pose) {
     const float turn = train::random_unit(options.seed, kTurn, options.first_pose + pose);
@@ -32,7 +32,7 @@ std::vector<Shot> scatter_shots(const PosedStudioOptions& options) {
 }
 
 std::vector<train::OwnedPose> choose_poses(const Population& population,
-                                           const PosedStudioOptions& options) {
+                                           const PosedMembersOptions& options) {
   std::vector<train::OwnedPose> poses =
       fixed_poses(population, options.motion, options.first_pose + options.poses);
   poses.erase(poses.begin(), poses.begin() + static_cast<std::ptrdiff_t>(options.first_pose));
@@ -57,8 +57,8 @@ std::vector<size_t> members_of(const Population& population, Split split) {
   return members;
 }
 
-PosedStudio::PosedStudio(const Package& population, const Package& body,
-                         const PosedStudioOptions& options)
+PosedMembers::PosedMembers(const Package& population, const Package& body,
+                           const PosedMembersOptions& options)
     : population_(&population.population()),
       options_(options),
       picture_px_(std::clamp(2 * population_->network.input_size, 128u, 256u)) {
@@ -69,25 +69,25 @@ PosedStudio::PosedStudio(const Package& population, const Package& body,
                      " training members, at least 2 are needed");
   throw_if_error(check_avatar_fits_body(OpenedMember(*population_, training[0]).avatar, body),
                  where);
-  studio_.emplace(body, choose_poses(*population_, options), scatter_shots(options));
+  renderer_.emplace(body, choose_poses(*population_, options), scatter_shots(options));
   const std::vector<size_t> framed_on = thin_out(training, kFramedOn);
   std::vector<std::vector<Extent>> extents(framed_on.size());
   Crew(options.threads, options.quiet).run("framing", framed_on.size(), [&](size_t i) {
-    extents[i] = studio_->look(OpenedMember(*population_, framed_on[i]).avatar);
+    extents[i] = renderer_->look(OpenedMember(*population_, framed_on[i]).avatar);
   });
   for (size_t shot = 0; shot < shots(); ++shot) {
     Extent all;
     for (const std::vector<Extent>& own : extents) all.add(own[shot]);
     if (!(all.right > all.left && all.bottom > all.top))
       throw InputError(where + ": its members cannot be seen");
-    studio_->frame(shot, all, picture_px_, picture_px_, kMargin);
+    renderer_->frame(shot, all, picture_px_, picture_px_, kMargin);
   }
 }
 
-void PosedStudio::draw(const std::string& what, std::span<const size_t> members,
-                       const std::function<void(size_t, std::vector<Picture>)>& take) const {
+void PosedMembers::draw(const std::string& what, std::span<const size_t> members,
+                        const std::function<void(size_t, std::vector<Picture>)>& take) const {
   Crew(options_.threads, options_.quiet).run(what, members.size(), [&](size_t i) {
-    take(i, studio_->draw(OpenedMember(*population_, members[i]).avatar, 0, shots()));
+    take(i, renderer_->draw(OpenedMember(*population_, members[i]).avatar, 0, shots()));
   });
 }
 
