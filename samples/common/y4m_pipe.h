@@ -19,8 +19,8 @@ namespace figurine::samples {
 class Y4mPipe final : public LiveSink {
  public:
   // descriptor: open for writing, the caller's to close; name: for messages. Changes none of its
-  // flags, which the other users of a standard output share. kInvalidArgument for a rate that y4m
-  // cannot say.
+  // flags, which the other users of a standard output share. SIGPIPE must be ignored
+  // (catch_interrupts). kInvalidArgument for a rate that y4m cannot say.
   static Result<std::unique_ptr<Y4mPipe>> create(int descriptor, const std::string& name,
                                                  ImageSize size, const Options& options);
   PixelFormat format() const override { return PixelFormat::kRgba8; }
