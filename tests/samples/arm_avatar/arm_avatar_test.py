@@ -14,7 +14,7 @@ import tempfile
 import unittest
 import zlib
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 BUILD, EMULATOR = sys.argv[1], sys.argv[2:]
 SIZE = 128
 
