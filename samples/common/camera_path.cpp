@@ -33,7 +33,7 @@ std::vector<std::array<float, 2>> ground_path(std::span<const uint32_t> frames, 
   return path;
 }
 
-// The direction in which most of the scene looks.
+// The direction in which most of the figures look.
 float mean_heading_deg(const Scene& scene) {
   double x = 0, z = 0;
   for (size_t m = 0; m < scene.size(); ++m) {
