@@ -1,4 +1,4 @@
-# The package: reader (what a device links), writer (offline and tests), inspector (on the reader alone).
+# The package: reader (what a device links), writer (offline and tests).
 
 find_program(FIGURINE_FLATC flatc REQUIRED)
 set(schema_header "${CMAKE_CURRENT_BINARY_DIR}/schema/package_generated.h")
@@ -34,11 +34,3 @@ target_include_directories(figurine_writer PUBLIC "${PROJECT_SOURCE_DIR}")
 target_include_directories(figurine_writer SYSTEM PRIVATE "${CMAKE_CURRENT_BINARY_DIR}/schema")
 target_compile_options(figurine_writer PRIVATE -fno-exceptions)
 figurine_guard(figurine_formats figurine_writer)
-
-# Needs figurine_ports_files (ports/linux), which is configured after this folder: targets are linked by name.
-find_package(CLI11 REQUIRED)
-find_package(nlohmann_json REQUIRED)
-add_executable(figurine-inspect inspect/compare.cpp inspect/describe.cpp inspect/main.cpp inspect/print.cpp)
-target_compile_definitions(figurine-inspect PRIVATE FIGURINE_VERSION="${PROJECT_VERSION}")
-target_include_directories(figurine-inspect PRIVATE "${PROJECT_SOURCE_DIR}")
-target_link_libraries(figurine-inspect PRIVATE figurine_formats figurine_ports_files CLI11::CLI11 nlohmann_json::nlohmann_json)

@@ -11,16 +11,17 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "ports/linux/files.h"
+#include "ports/host/clock.h"
+#include "ports/host/files.h"
+#include "samples/common/camera_path.h"
+#include "samples/common/device_options.h"
+#include "samples/common/frame_log.h"
+#include "samples/common/machine.h"
+#include "samples/common/progress.h"
+#include "samples/common/rendered_frame.h"
+#include "samples/common/scene.h"
 #include "samples/figurine/allocation_counter.h"
-#include "samples/figurine/cast.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/device_options.h"
-#include "samples/figurine/frame_log.h"
-#include "samples/figurine/frame_sink.h"
-#include "samples/figurine/machine.h"
-#include "samples/figurine/progress.h"
-#include "samples/figurine/rig.h"
 
 namespace figurine::samples {
 
@@ -29,33 +30,33 @@ namespace {
 constexpr uint32_t kWarmUpFrames = 3;
 
 struct BenchOptions {
-  CastOptions cast;
+  SceneOptions scene;
   DeviceOptions device;
   std::string size, json;
   uint32_t frames = 60;
 };
 
-// One renderer with its own copy of the cast and what its frames cost.
+// One renderer with its own copy of the scene and what its frames cost.
 struct Lane {
   Precision precision = Precision::kFloat32;
   uint32_t threads = 1;
   std::unique_ptr<Renderer> renderer;
-  std::unique_ptr<Cast> cast;
+  std::unique_ptr<Scene> scene;
   std::vector<uint32_t> frames;
   std::vector<Camera> cameras;
   FrameLog log;
   uint64_t allocations = 0;
 
   std::span<const FrameAvatar> pose(uint32_t i) {
-    return cast->moves() ? cast->pose(frames[i % frames.size()]) : cast->sway(i);
+    return scene->moves() ? scene->pose(frames[i % frames.size()]) : scene->sway(i);
   }
   Status render(uint32_t i, RenderedFrame& frame, bool measured) {
     const std::span<const FrameAvatar> posed = pose(i);
     if (measured) start_counting_allocations();
-    const uint64_t start_ns = now_ns();
+    const uint64_t start_ns = ports::now_ns();
     const Status status =
         renderer->render({.camera = cameras[i % cameras.size()], .avatars = posed}, frame.target());
-    const uint64_t total_ns = now_ns() - start_ns;
+    const uint64_t total_ns = ports::now_ns() - start_ns;
     if (measured) {
       allocations += stop_counting_allocations();
       log.add(renderer->statistics(), total_ns);
@@ -68,28 +69,30 @@ struct FirstFrame {
   double open_ms = 0, prepare_ms = 0, render_ms = 0;
 };
 
-double ms_since(uint64_t start_ns) { return static_cast<double>(now_ns() - start_ns) * 1e-6; }
+double ms_since(uint64_t start_ns) {
+  return static_cast<double>(ports::now_ns() - start_ns) * 1e-6;
+}
 
 // From closed files to the first picture, by the golden pose and camera.
 Status open_lane(const BenchOptions& options, RendererOptions renderer_options, Lane& lane,
                  FirstFrame& first) {
-  uint64_t start_ns = now_ns();
-  Result<Cast> cast = Cast::load(options.cast);
-  if (!cast.ok()) return cast.status();
-  lane.cast = std::make_unique<Cast>(std::move(*cast));
+  uint64_t start_ns = ports::now_ns();
+  Result<Scene> scene = Scene::load(options.scene);
+  if (!scene.ok()) return scene.status();
+  lane.scene = std::make_unique<Scene>(std::move(*scene));
   first.open_ms = ms_since(start_ns);
-  start_ns = now_ns();
+  start_ns = ports::now_ns();
   renderer_options.threads = lane.threads;
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
   if (!renderer.ok()) return renderer.status();
   lane.renderer = std::move(*renderer);
-  FIG_RETURN_IF_ERROR(lane.cast->add_to(*lane.renderer, lane.precision));
+  FIG_RETURN_IF_ERROR(lane.scene->add_to(*lane.renderer, lane.precision));
   first.prepare_ms = ms_since(start_ns);
-  const Camera& camera = lane.cast->avatar(0).avatar.golden.camera;
+  const Camera& camera = lane.scene->avatar(0).avatar.golden.camera;
   RenderedFrame frame({camera.width_px, camera.height_px}, PixelFormat::kRgba8);
-  start_ns = now_ns();
+  start_ns = ports::now_ns();
   FIG_RETURN_IF_ERROR(
-      lane.renderer->render({.camera = camera, .avatars = lane.cast->pose(0)}, frame.target()));
+      lane.renderer->render({.camera = camera, .avatars = lane.scene->pose(0)}, frame.target()));
   first.render_ms = ms_since(start_ns);
   return {};
 }
@@ -98,7 +101,7 @@ Status open_lane(const BenchOptions& options, RendererOptions renderer_options, 
 Result<std::vector<Precision>> choose_precisions(const BenchOptions& options) {
   if (const std::optional<Precision> asked = options.device.network_precision())
     return std::vector<Precision>{*asked};
-  const Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.cast.avatars[0]);
+  const Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.scene.avatars[0]);
   if (!avatar.ok()) return avatar.status();
   std::vector<Precision> precisions;
   for (const Precision precision : {Precision::kFixedPoint, Precision::kFloat32}) {
@@ -169,11 +172,11 @@ void print_table(const nlohmann::ordered_json& json) {
 Status run_bench(const BenchOptions& options) {
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
-  RigOptions rig;
+  CameraPathOptions camera_path;
   if (!options.size.empty()) {
     const Result<ImageSize> size = parse_size(options.size);
     if (!size.ok()) return size.status();
-    rig.size = *size;
+    camera_path.size = *size;
   }
 
   const Result<std::vector<Precision>> precisions = choose_precisions(options);
@@ -193,12 +196,12 @@ Status run_bench(const BenchOptions& options) {
     lane.threads = threads;
     FirstFrame again;
     FIG_RETURN_IF_ERROR(open_lane(options, *renderer_options, lane, lanes.empty() ? first : again));
-    Result<std::vector<uint32_t>> frames = lane.cast->frames({});
+    Result<std::vector<uint32_t>> frames = lane.scene->frames({});
     if (!frames.ok()) return frames.status();
     lane.frames = std::move(*frames);
     if (lane.frames.size() > options.frames) lane.frames.resize(options.frames);
     Result<std::vector<Camera>> cameras =
-        place_cameras(rig, lane.frames, *lane.cast, *lane.renderer);
+        make_camera_path(camera_path, lane.frames, *lane.scene, *lane.renderer);
     if (!cameras.ok()) return cameras.status();
     lane.cameras = std::move(*cameras);
     if (!frame)
@@ -221,14 +224,14 @@ Status run_bench(const BenchOptions& options) {
   }
 
   nlohmann::ordered_json json = json_header("bench");
-  json["date"] = date_utc();
+  json["date"] = ports::date_utc();
   json["machine"] =
       json_machine(options.device, renderer_options->threads, to_string(lanes[0].precision));
-  json["avatar"] = options.cast.avatars[0];
-  json["avatar_bytes"] = lanes[0].cast->avatar(0).package->package.size_bytes();
-  json["body_bytes"] = lanes[0].cast->body(0).package.size_bytes();
-  json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json()
-                                                : nlohmann::ordered_json(options.cast.motions[0]);
+  json["avatar"] = options.scene.avatars[0];
+  json["avatar_bytes"] = lanes[0].scene->avatar(0).package->package.size_bytes();
+  json["body_bytes"] = lanes[0].scene->body(0).package.size_bytes();
+  json["motion"] = options.scene.motions.empty() ? nlohmann::ordered_json()
+                                                 : nlohmann::ordered_json(options.scene.motions[0]);
   json["frames"] = options.frames;
   json["size"] = {lanes[0].cameras[0].width_px, lanes[0].cameras[0].height_px};
   json["first_frame_ms"] = {{"total", first.open_ms + first.prepare_ms + first.render_ms},
@@ -257,17 +260,17 @@ Status run_bench(const BenchOptions& options) {
 Command add_bench_command(CLI::App& app) {
   auto options = std::make_shared<BenchOptions>();
   CLI::App* command = app.add_subcommand("bench", "Measures what a frame costs on this machine");
-  options->cast.avatars.resize(1);
+  options->scene.avatars.resize(1);
   command
       ->add_option(
-          "avatar", options->cast.avatars[0],
+          "avatar", options->scene.avatars[0],
           "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->cast.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
   command
-      ->add_option("--motion", options->cast.motions,
+      ->add_option("--motion", options->scene.motions,
                    "motion package; default: the golden pose, swaying")
       ->expected(1);
   command->add_option("--frames", options->frames, "measured frames")

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
-#include "samples/figurine/frame_sink.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
+#include "samples/common/rendered_frame.h"
 
 namespace figurine::samples {
 

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "figurine/status.h"
-#include "ports/linux/image.h"
-#include "samples/figurine/parse.h"
+#include "ports/media/image.h"
+#include "samples/common/parse.h"
 
 namespace figurine::samples {
 

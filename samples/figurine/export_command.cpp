@@ -3,10 +3,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "ports/linux/files.h"
-#include "samples/figurine/cast.h"
+#include "ports/host/files.h"
+#include "samples/common/device_options.h"
+#include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/device_options.h"
 #include "samples/gaussians/ply.h"
 
 namespace figurine::samples {
@@ -14,7 +14,7 @@ namespace figurine::samples {
 namespace {
 
 struct ExportOptions {
-  CastOptions cast;
+  SceneOptions scene;
   uint32_t frame = 0;
   std::string output;
   DeviceOptions device;
@@ -25,25 +25,25 @@ Status run_export(const ExportOptions& options) {
   if (!renderer_options.ok()) return renderer_options.status();
   if (!options.output.ends_with(".ply"))
     return Status(StatusCode::kUnsupported, options.output + ": Gaussians are exported as .ply");
-  Result<Cast> cast = Cast::load(options.cast);
-  if (!cast.ok()) return cast.status();
+  Result<Scene> scene = Scene::load(options.scene);
+  if (!scene.ok()) return scene.status();
   const Result<std::vector<uint32_t>> frames =
-      cast->frames({.first = options.frame, .end = options.frame + 1});
+      scene->frames({.first = options.frame, .end = options.frame + 1});
   if (!frames.ok()) return frames.status();
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
   if (!renderer.ok()) return renderer.status();
-  FIG_RETURN_IF_ERROR(cast->add_to(**renderer, options.device.network_precision()));
-  const FrameAvatar posed = cast->pose(options.frame)[0];
+  FIG_RETURN_IF_ERROR(scene->add_to(**renderer, options.device.network_precision()));
+  const FrameAvatar posed = scene->pose(options.frame)[0];
   const Result<GaussianView> gaussians = (*renderer)->pose_avatar(posed.avatar, posed.pose);
   if (!gaussians.ok()) return gaussians.status();
   const std::vector<std::byte> bytes = write_gaussian_ply(*gaussians);
   FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.output, bytes));
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("export");
-    json["avatar"] = options.cast.avatars[0];
+    json["avatar"] = options.scene.avatars[0];
     json["output"] = options.output;
     json["frame"] = options.frame;
-    json["precision"] = cast->precision(**renderer);
+    json["precision"] = scene->precision(**renderer);
     json["gaussians"] = gaussians->count;
     json["sh_degree"] = gaussians->sh_degree;
     json["size_bytes"] = bytes.size();
@@ -58,16 +58,17 @@ Command add_export_command(CLI::App& app) {
   auto options = std::make_shared<ExportOptions>();
   CLI::App* command =
       app.add_subcommand("export", "Writes an avatar in one pose as .ply Gaussians");
-  options->cast.avatars.resize(1);
+  options->scene.avatars.resize(1);
   command
       ->add_option(
-          "avatar", options->cast.avatars[0],
+          "avatar", options->scene.avatars[0],
           "avatar package (.fgn), or a member of a population (people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->cast.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
-  command->add_option("--motion", options->cast.motions, "motion package; default: the golden pose")
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
+  command
+      ->add_option("--motion", options->scene.motions, "motion package; default: the golden pose")
       ->expected(1);
   command->add_option("--frame", options->frame, "of the motion")
       ->check(CLI::Range(0u, UINT32_MAX - 1))

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 
 namespace figurine::samples {
 

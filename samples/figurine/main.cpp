@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <exception>
 
+#include "samples/common/progress.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/progress.h"
 
 int main(int argc, char** argv) {
   using namespace figurine;

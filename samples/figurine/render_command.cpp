@@ -3,22 +3,24 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "samples/figurine/cast.h"
+#include "ports/host/clock.h"
+#include "samples/common/camera_path.h"
+#include "samples/common/device_options.h"
+#include "samples/common/file_sink.h"
+#include "samples/common/frame_log.h"
+#include "samples/common/machine.h"
+#include "samples/common/progress.h"
+#include "samples/common/rendered_frame.h"
+#include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/contact_sheet.h"
-#include "samples/figurine/device_options.h"
-#include "samples/figurine/frame_log.h"
-#include "samples/figurine/frame_sink.h"
-#include "samples/figurine/machine.h"
-#include "samples/figurine/progress.h"
-#include "samples/figurine/rig.h"
 
 namespace figurine::samples {
 
 namespace {
 
 struct RenderOptions {
-  CastOptions cast;
+  SceneOptions scene;
   DeviceOptions device;
   std::string frames, camera, size, background, follow = "smooth";
   std::optional<float> near_m;
@@ -32,9 +34,9 @@ constexpr std::array<float, 3> kVideoBackground{
 
 // Everything that the command line said, checked and loaded.
 struct Job {
-  Cast cast;
+  Scene scene;
   std::vector<uint32_t> frames;
-  RigOptions rig;
+  CameraPathOptions camera_path;
   std::optional<std::array<float, 3>> background;
   double frames_per_second = 30;
 };
@@ -54,8 +56,8 @@ Result<Job> prepare(const RenderOptions& options) {
   if (options.background.empty() && is_video_name(options.output))
     background->colour = kVideoBackground;
 
-  Result<Cast> cast = Cast::load(options.cast);
-  if (!cast.ok()) return cast.status();
+  Result<Scene> scene = Scene::load(options.scene);
+  if (!scene.ok()) return scene.status();
   // One image of a motion is its first frame, unless a frame is named; a sequence is all of it.
   const bool one_image = options.output.find('%') == std::string::npos &&
                          !is_video_name(options.output) && options.contact_sheet.empty();
@@ -63,22 +65,23 @@ Result<Job> prepare(const RenderOptions& options) {
                                                 : one_image             ? "0"
                                                                         : ":");
   if (!range.ok()) return range.status();
-  Result<std::vector<uint32_t>> frames = cast->frames(*range);
+  Result<std::vector<uint32_t>> frames = scene->frames(*range);
   if (!frames.ok()) return frames.status();
 
-  RigOptions rig{.follow = options.follow == "smooth", .near_m = options.near_m};
+  CameraPathOptions camera_path{.follow = options.follow == "smooth", .near_m = options.near_m};
   if (!options.size.empty()) {
     const Result<ImageSize> size = parse_size(options.size);
     if (!size.ok()) return size.status();
-    rig.size = *size;
+    camera_path.size = *size;
   }
   if (!options.camera.empty()) {
     const Result<CameraSpec> camera = parse_camera_spec(options.camera);
     if (!camera.ok()) return camera.status();
-    rig.camera = *camera;
+    camera_path.camera = *camera;
   }
-  const double rate = options.frames_per_second.value_or(cast->frames_per_second() / range->step);
-  return Job{std::move(*cast), std::move(*frames), std::move(rig), background->colour, rate};
+  const double rate = options.frames_per_second.value_or(scene->frames_per_second() / range->step);
+  return Job{std::move(*scene), std::move(*frames), std::move(camera_path), background->colour,
+             rate};
 }
 
 Status run_render(const RenderOptions& options) {
@@ -89,21 +92,21 @@ Status run_render(const RenderOptions& options) {
 
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
   if (!renderer.ok()) return renderer.status();
-  FIG_RETURN_IF_ERROR(job->cast.add_to(**renderer, options.device.network_precision()));
+  FIG_RETURN_IF_ERROR(job->scene.add_to(**renderer, options.device.network_precision()));
   const Result<std::vector<Camera>> cameras =
-      place_cameras(job->rig, job->frames, job->cast, **renderer);
+      make_camera_path(job->camera_path, job->frames, job->scene, **renderer);
   if (!cameras.ok()) return cameras.status();
   const ImageSize size{cameras->front().width_px, cameras->front().height_px};
   const auto frame_count = static_cast<uint32_t>(job->frames.size());
   const bool opaque = job->background.has_value();
 
-  std::unique_ptr<FrameSink> sink;
+  std::unique_ptr<FileSink> sink;
   if (!options.output.empty()) {
-    Result<std::unique_ptr<FrameSink>> created =
-        FrameSink::create(options.output, {.size = size,
-                                           .frame_count = frame_count,
-                                           .frames_per_second = job->frames_per_second,
-                                           .opaque = opaque});
+    Result<std::unique_ptr<FileSink>> created =
+        FileSink::create(options.output, {.size = size,
+                                          .frame_count = frame_count,
+                                          .frames_per_second = job->frames_per_second,
+                                          .opaque = opaque});
     if (!created.ok()) return created.status();
     sink = std::move(*created);
   }
@@ -125,26 +128,26 @@ Status run_render(const RenderOptions& options) {
   RenderedFrame frame(size, sink ? sink->format() : PixelFormat::kRgba8);
   FrameLog log;
   Progress progress("render", frame_count);
-  const uint64_t start_ns = now_ns();
+  const uint64_t start_ns = ports::now_ns();
   for (uint32_t i = 0; i < frame_count; ++i) {
     FIG_RETURN_IF_ERROR(check_interrupt());
-    const uint64_t frame_start_ns = now_ns();
+    const uint64_t frame_start_ns = ports::now_ns();
     FIG_RETURN_IF_ERROR((*renderer)->render({.camera = (*cameras)[i],
-                                             .avatars = job->cast.pose(job->frames[i]),
+                                             .avatars = job->scene.pose(job->frames[i]),
                                              .background = job->background},
                                             frame.target()));
-    log.add((*renderer)->statistics(), now_ns() - frame_start_ns);
+    log.add((*renderer)->statistics(), ports::now_ns() - frame_start_ns);
     if (sink) FIG_RETURN_IF_ERROR(sink->add(frame));
     if (sheet) sheet->offer(i, frame.u8);
     progress.update(i + 1);
   }
   if (sink) FIG_RETURN_IF_ERROR(sink->finish());
   if (sheet) FIG_RETURN_IF_ERROR(sheet->write(options.contact_sheet, opaque));
-  const double wall_s = static_cast<double>(now_ns() - start_ns) * 1e-9;
+  const double wall_s = static_cast<double>(ports::now_ns() - start_ns) * 1e-9;
 
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("render");
-    json["avatars"] = options.cast.avatars;
+    json["avatars"] = options.scene.avatars;
     json["output"] = options.output;
     if (sheet) json["contact_sheet"] = options.contact_sheet;
     json["frames"] = frame_count;
@@ -158,7 +161,7 @@ Status run_render(const RenderOptions& options) {
     json["renderer_memory_bytes"] = (*renderer)->memory_bytes();
     json["peak_memory_bytes"] = peak_memory_bytes();
     json["machine"] =
-        json_machine(options.device, renderer_options->threads, job->cast.precision(**renderer));
+        json_machine(options.device, renderer_options->threads, job->scene.precision(**renderer));
     print_json(json);
   }
   return {};
@@ -171,25 +174,25 @@ Command add_render_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("render", "Renders avatars to images or video");
   command
       ->add_option(
-          "avatars", options->cast.avatars,
+          "avatars", options->scene.avatars,
           "avatar packages (.fgn), or members of populations (people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->cast.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
   command
-      ->add_option("--motion", options->cast.motions,
+      ->add_option("--motion", options->scene.motions,
                    "motion packages: one for all avatars, or one for each")
       ->expected(1)
       ->take_all();
   command->add_option("--frames", options->frames,
                       "N, A:B or A:B:STEP (B excluded); default: all, or frame 0 for one image");
   command
-      ->add_option("--place", options->cast.places,
+      ->add_option("--place", options->scene.places,
                    "X,Z[,HEADING] in metres and degrees, once for each avatar")
       ->expected(1)
       ->take_all();
-  command->add_option("--spacing", options->cast.spacing_m, "metres between avatars side by side")
+  command->add_option("--spacing", options->scene.spacing_m, "metres between avatars side by side")
       ->check(CLI::Range(-1000.0f, 1000.0f))
       ->capture_default_str();
   command->add_option("--camera", options->camera,

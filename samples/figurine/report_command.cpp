@@ -8,19 +8,20 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "ports/linux/png.h"
-#include "samples/figurine/cast.h"
+#include "ports/host/clock.h"
+#include "ports/media/png.h"
+#include "samples/common/camera_path.h"
+#include "samples/common/device_options.h"
+#include "samples/common/frame_log.h"
+#include "samples/common/loading.h"
+#include "samples/common/machine.h"
+#include "samples/common/progress.h"
+#include "samples/common/rendered_frame.h"
+#include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/device_options.h"
-#include "samples/figurine/frame_log.h"
-#include "samples/figurine/frame_sink.h"
 #include "samples/figurine/image_error.h"
-#include "samples/figurine/loading.h"
-#include "samples/figurine/machine.h"
-#include "samples/figurine/progress.h"
 #include "samples/figurine/report_files.h"
 #include "samples/figurine/report_page.h"
-#include "samples/figurine/rig.h"
 #include "samples/figurine/sampler_report.h"
 
 namespace figurine::samples {
@@ -115,7 +116,7 @@ std::vector<Dial> dials(bool both_precisions) {
 }
 
 struct ReportOptions {
-  CastOptions cast;
+  SceneOptions scene;
   DeviceOptions device;
   std::string size, output;
   uint32_t frames = 16;
@@ -127,39 +128,40 @@ struct Measurement {
   FrameLog log;
 };
 
-// A renderer with its own copy of the cast, in one precision.
-struct Troupe {
+// A renderer with its own copy of the scene, in one precision.
+struct SceneRenderer {
   std::unique_ptr<Renderer> renderer;
-  std::unique_ptr<Cast> cast;
+  std::unique_ptr<Scene> scene;
 };
 
-Result<Troupe> assemble(const CastOptions& options, const RendererOptions& renderer_options,
-                        std::optional<Precision> precision) {
-  Result<Cast> cast = Cast::load(options);
-  if (!cast.ok()) return cast.status();
+Result<SceneRenderer> make_scene_renderer(const SceneOptions& options,
+                                          const RendererOptions& renderer_options,
+                                          std::optional<Precision> precision) {
+  Result<Scene> scene = Scene::load(options);
+  if (!scene.ok()) return scene.status();
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
   if (!renderer.ok()) return renderer.status();
-  FIG_RETURN_IF_ERROR(cast->add_to(**renderer, precision));
-  return Troupe{std::move(*renderer), std::make_unique<Cast>(std::move(*cast))};
+  FIG_RETURN_IF_ERROR(scene->add_to(**renderer, precision));
+  return SceneRenderer{std::move(*renderer), std::make_unique<Scene>(std::move(*scene))};
 }
 
 // Draws frame number i of the run with any setting.
-class Studio {
+class SettingRenderer {
  public:
-  // floats: for settings that ask for f32, where the first troupe has another precision; may be
+  // floats: for settings that ask for f32, where the first has another precision; may be
   // empty.
-  Studio(Troupe first, Troupe floats, std::vector<uint32_t> frames, std::vector<Camera> cameras)
+  SettingRenderer(SceneRenderer first, SceneRenderer floats, std::vector<uint32_t> frames,
+                  std::vector<Camera> cameras)
       : first_(std::move(first)),
         floats_(std::move(floats)),
         frames_(std::move(frames)),
         cameras_(std::move(cameras)) {}
 
   Status draw(uint32_t i, const Knobs& knobs, RenderedFrame& picture) {
-    Troupe& troupe = troupe_of(knobs);
-    const std::span<const FrameAvatar> posed = troupe.cast->moves()
-                                                   ? troupe.cast->pose(frames_[i % frames_.size()])
-                                                   : troupe.cast->sway(i);
-    return troupe.renderer->render(
+    SceneRenderer& used = renderer_of(knobs);
+    const std::span<const FrameAvatar> posed =
+        used.scene->moves() ? used.scene->pose(frames_[i % frames_.size()]) : used.scene->sway(i);
+    return used.renderer->render(
         {.camera = cameras_[i % cameras_.size()], .avatars = posed, .splat = knobs.splat},
         picture.target());
   }
@@ -167,19 +169,20 @@ class Studio {
                  RenderedFrame& f32, Measurement& result) {
     FIG_RETURN_IF_ERROR(draw(i, setting.knobs, f32));
     add_foreground_error(truth.f32, f32.f32, result.error);
-    const uint64_t start_ns = now_ns();  // timed by itself, into the 8-bit picture that a user sees
+    const uint64_t start_ns =
+        ports::now_ns();  // timed by itself, into the 8-bit picture that a user sees
     FIG_RETURN_IF_ERROR(draw(i, setting.knobs, u8));
-    result.log.add(troupe_of(setting.knobs).renderer->statistics(), now_ns() - start_ns);
+    result.log.add(renderer_of(setting.knobs).renderer->statistics(), ports::now_ns() - start_ns);
     return {};
   }
   ImageSize size() const { return {cameras_[0].width_px, cameras_[0].height_px}; }
 
  private:
-  Troupe& troupe_of(const Knobs& knobs) {
+  SceneRenderer& renderer_of(const Knobs& knobs) {
     return knobs.precision == Precision::kFloat32 && floats_.renderer != nullptr ? floats_ : first_;
   }
 
-  Troupe first_, floats_;
+  SceneRenderer first_, floats_;
   std::vector<uint32_t> frames_;
   std::vector<Camera> cameras_;
 };
@@ -226,12 +229,12 @@ Result<std::vector<std::byte>> draw_difference(const ports::ImageF32& truth,
 }
 
 // The truth and the differences of a coarse setting, the default and a fine one, for one frame.
-Status draw_pictures(Studio& studio, uint32_t frame, const Dial& dial,
+Status draw_pictures(SettingRenderer& drawing, uint32_t frame, const Dial& dial,
                      std::vector<ReportPicture>& pictures) {
   constexpr float kGain = 32;
-  RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32),
-      picture(studio.size(), PixelFormat::kRgbaF32);
-  FIG_RETURN_IF_ERROR(studio.draw(frame, dial.reference, truth));
+  RenderedFrame truth(drawing.size(), PixelFormat::kRgbaF32),
+      picture(drawing.size(), PixelFormat::kRgbaF32);
+  FIG_RETURN_IF_ERROR(drawing.draw(frame, dial.reference, truth));
   const Box box = foreground_box(truth.f32);
   Result<std::vector<std::byte>> png = draw_difference(truth.f32, truth.f32, box, 0);
   if (!png.ok()) return png.status();
@@ -239,7 +242,7 @@ Status draw_pictures(Studio& studio, uint32_t frame, const Dial& dial,
   for (size_t s = 0; s < dial.settings.size(); ++s) {
     const Setting& setting = dial.settings[s];
     if (!setting.is_default && s != 1 && s + 2 != dial.settings.size()) continue;
-    FIG_RETURN_IF_ERROR(studio.draw(frame, setting.knobs, picture));
+    FIG_RETURN_IF_ERROR(drawing.draw(frame, setting.knobs, picture));
     png = draw_difference(truth.f32, picture.f32, box, kGain);
     if (!png.ok()) return png.status();
     pictures.push_back({dial.name + " " + setting.label + (setting.is_default ? " (default)" : "") +
@@ -275,6 +278,7 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
                                  {"theory", dial.theory}};
   if (dial.theoretical_order) json["theoretical_order"] = *dial.theoretical_order;
   json["observed_order"] = overall_order(dial, measurements);
+  json["observed_over"] = "all settings, by least squares";
   json["stages"] = nlohmann::ordered_json::array();
   for (const Stage stage : dial.stages) json["stages"].push_back(to_string(stage));
   json["settings"] = nlohmann::ordered_json::array();
@@ -303,72 +307,75 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
 
 Status run_report(const ReportOptions& options) {
   // Whatever else it is, or is not, is said by what loads an avatar.
-  if (const auto loaded = load_package(options.cast.avatars[0]);
+  if (const auto loaded = load_package(options.scene.avatars[0]);
       loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
-    return run_sampler_report(**loaded, {.body = options.cast.body,
+    return run_sampler_report(**loaded, {.body = options.scene.body,
                                          .seeds = options.seeds,
                                          .output = options.output,
                                          .json = options.device.json});
   }
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
-  RigOptions rig;
+  CameraPathOptions camera_path;
   if (!options.size.empty()) {
     const Result<ImageSize> size = parse_size(options.size);
     if (!size.ok()) return size.status();
-    rig.size = *size;
+    camera_path.size = *size;
   }
-  Result<Troupe> first =
-      assemble(options.cast, *renderer_options, options.device.network_precision());
+  Result<SceneRenderer> first =
+      make_scene_renderer(options.scene, *renderer_options, options.device.network_precision());
   if (!first.ok()) return first.status();
-  Cast& cast = *first->cast;
-  const bool both = options.device.precision.empty() && cast.holds(Precision::kFloat32) &&
-                    cast.holds(Precision::kFixedPoint);
-  Result<Troupe> floats =
-      both ? assemble(options.cast, *renderer_options, Precision::kFloat32) : Troupe{};
+  Scene& scene = *first->scene;
+  const bool both = options.device.precision.empty() && scene.holds(Precision::kFloat32) &&
+                    scene.holds(Precision::kFixedPoint);
+  Result<SceneRenderer> floats =
+      both ? make_scene_renderer(options.scene, *renderer_options, Precision::kFloat32)
+           : SceneRenderer{};
   if (!floats.ok()) return floats.status();
   // Evenly over the whole motion.
-  const Result<std::vector<uint32_t>> all = cast.frames({});
+  const Result<std::vector<uint32_t>> all = scene.frames({});
   if (!all.ok()) return all.status();
   std::vector<uint32_t> frames;
   for (uint32_t i = 0; i < std::min<size_t>(options.frames, all->size()); ++i) {
     frames.push_back(
         (*all)[size_t(i) * all->size() / std::min<size_t>(options.frames, all->size())]);
   }
-  Result<std::vector<Camera>> cameras = place_cameras(rig, frames, cast, *first->renderer);
+  Result<std::vector<Camera>> cameras =
+      make_camera_path(camera_path, frames, scene, *first->renderer);
   if (!cameras.ok()) return cameras.status();
-  const std::string precision = cast.precision(*first->renderer);
-  Studio studio(std::move(*first), std::move(*floats), std::move(frames), std::move(*cameras));
+  const std::string precision = scene.precision(*first->renderer);
+  SettingRenderer drawing(std::move(*first), std::move(*floats), std::move(frames),
+                          std::move(*cameras));
 
   const std::vector<Dial> table = dials(both);
   std::vector<std::vector<Measurement>> measurements;
   for (const Dial& dial : table) measurements.emplace_back(dial.settings.size());
-  RenderedFrame truth(studio.size(), PixelFormat::kRgbaF32),
-      f32(studio.size(), PixelFormat::kRgbaF32), u8(studio.size(), PixelFormat::kRgba8);
+  RenderedFrame truth(drawing.size(), PixelFormat::kRgbaF32),
+      f32(drawing.size(), PixelFormat::kRgbaF32), u8(drawing.size(), PixelFormat::kRgba8);
   Progress progress("report", options.frames);
   for (uint32_t i = 0; i < options.frames; ++i) {
     for (size_t d = 0; d < table.size(); ++d) {
-      FIG_RETURN_IF_ERROR(studio.draw(i, table[d].reference, truth));
+      FIG_RETURN_IF_ERROR(drawing.draw(i, table[d].reference, truth));
       const size_t count = table[d].settings.size();
       for (size_t turn = 0; turn < count; ++turn) {  // another setting begins each round: nobody is
                                                      // always first after the reference
         FIG_RETURN_IF_ERROR(check_interrupt());
         const size_t s = (i + turn) % count;
         FIG_RETURN_IF_ERROR(
-            studio.measure(i, table[d].settings[s], truth, u8, f32, measurements[d][s]));
+            drawing.measure(i, table[d].settings[s], truth, u8, f32, measurements[d][s]));
       }
     }
     progress.update(i + 1);
   }
 
   nlohmann::ordered_json json = json_header("report");
-  json["date"] = date_utc();
+  json["date"] = ports::date_utc();
   json["machine"] = json_machine(options.device, renderer_options->threads, precision);
-  json["avatar"] = options.cast.avatars[0];
-  json["motion"] = options.cast.motions.empty() ? nlohmann::ordered_json()
-                                                : nlohmann::ordered_json(options.cast.motions[0]);
+  json["avatar"] = options.scene.avatars[0];
+  json["motion"] = options.scene.motions.empty() ? nlohmann::ordered_json()
+                                                 : nlohmann::ordered_json(options.scene.motions[0]);
   json["frames"] = options.frames;
-  json["size"] = {studio.size().width_px, studio.size().height_px};
+  json["size"] = {drawing.size().width_px, drawing.size().height_px};
   json["reference"] = {{"alpha_cut", kReferenceCut}, {"meaning", kReferenceMeaning}};
   json["metric"] =
       "PSNR over pixels whose alpha in the reference exceeds 0.5, on stored sRGB values in float "
@@ -382,7 +389,7 @@ Status run_report(const ReportOptions& options) {
   for (size_t d = 0; d < table.size(); ++d)
     json["dials"].push_back(dial_json(table[d], measurements[d]));
   std::vector<ReportPicture> pictures;
-  FIG_RETURN_IF_ERROR(draw_pictures(studio, options.frames / 2, table[0], pictures));
+  FIG_RETURN_IF_ERROR(draw_pictures(drawing, options.frames / 2, table[0], pictures));
   FIG_RETURN_IF_ERROR(write_report(options.output, json, report_html(json, pictures)));
   if (options.device.json) print_json(json);
   return {};
@@ -394,17 +401,17 @@ Command add_report_command(CLI::App& app) {
   auto options = std::make_shared<ReportOptions>();
   CLI::App* command =
       app.add_subcommand("report", "Plots error against run time: report.json and report.html");
-  options->cast.avatars.resize(1);
+  options->scene.avatars.resize(1);
   command
-      ->add_option("avatar", options->cast.avatars[0],
+      ->add_option("avatar", options->scene.avatars[0],
                    "avatar or sampler package (.fgn), or a member of a population "
                    "(people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->cast.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
   command
-      ->add_option("--motion", options->cast.motions,
+      ->add_option("--motion", options->scene.motions,
                    "motion package; default: the golden pose, swaying")
       ->expected(1);
   command->add_option("--frames", options->frames, "measured frames, evenly over the motion")

@@ -5,7 +5,7 @@
 #include <span>
 #include <system_error>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 
 namespace figurine::samples {
 

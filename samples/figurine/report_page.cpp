@@ -140,9 +140,10 @@ std::string plots_of(const Json& dial) {
          "<div class=\"words\"><p><b>In theory.</b> " +
          escape_html(dial["theory"].get<std::string>()) + " Order " +
          format("%g", dial["theoretical_order"]) + ".</p><p><b>Observed.</b> " +
-         (dial["observed_order"].is_null() ? "No error to speak of."
-                                           : "Order " + format("%.2f", dial["observed_order"]) +
-                                                 ", by least squares over all settings.") +
+         (dial["observed_order"].is_null()
+              ? "No error to speak of."
+              : "Order " + format("%.2f", dial["observed_order"]) + ", over " +
+                    escape_html(dial["observed_over"].get<std::string>()) + ".") +
          "</p></div>" + "</div>\n";
 }
 

@@ -10,14 +10,16 @@
 #include "figurine/avatar_sampler.h"
 #include "figurine/renderer.h"
 #include "formats/writer/package_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/clock.h"
+#include "ports/host/files.h"
+#include "samples/common/device_options.h"
+#include "samples/common/file_sink.h"
+#include "samples/common/loading.h"
+#include "samples/common/machine.h"
+#include "samples/common/progress.h"
+#include "samples/common/rendered_frame.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/contact_sheet.h"
-#include "samples/figurine/device_options.h"
-#include "samples/figurine/frame_sink.h"
-#include "samples/figurine/loading.h"
-#include "samples/figurine/machine.h"
-#include "samples/figurine/progress.h"
 
 namespace figurine::samples {
 
@@ -32,26 +34,26 @@ struct SampleOptions {
 };
 
 // A person in the golden pose, as the golden camera sees it.
-struct Portrait {
+struct GoldenPicture {
   RenderedFrame frame;
   uint64_t memory_bytes = 0;  // of the renderer
 };
 
-Result<Portrait> draw(const Avatar& avatar, const Package& body, Precision precision) {
+Result<GoldenPicture> draw(const Avatar& avatar, const Package& body, Precision precision) {
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1});
   if (!renderer.ok()) return renderer.status();
   const Result<AvatarId> id = (*renderer)->add_avatar(avatar, body, precision);
   if (!id.ok()) return id.status();
   const GoldenFrame& golden = avatar.golden;
-  Portrait portrait{
+  GoldenPicture picture{
       RenderedFrame({golden.camera.width_px, golden.camera.height_px}, PixelFormat::kRgba8), 0};
   const FrameAvatar posed[] = {
       {.avatar = *id, .pose = {golden.root_translation_m, golden.rotations}}};
   FIG_RETURN_IF_ERROR((*renderer)->render(
       {.camera = golden.camera, .avatars = posed, .background = golden.background},
-      portrait.frame.target()));
-  portrait.memory_bytes = (*renderer)->memory_bytes();
-  return portrait;
+      picture.frame.target()));
+  picture.memory_bytes = (*renderer)->memory_bytes();
+  return picture;
 }
 
 // Draws what the denoiser believes in after every step: one picture each, and all of them in a
@@ -64,7 +66,7 @@ class Strip final : public AvatarSampler::Trace {
     std::filesystem::create_directories(folder, error);
     if (error) return Status(StatusCode::kIo, folder + ": cannot be created: " + error.message());
     const ImageSize size{sampler.golden.camera.width_px, sampler.golden.camera.height_px};
-    Result<std::unique_ptr<FrameSink>> sink = FrameSink::create(
+    Result<std::unique_ptr<FileSink>> sink = FileSink::create(
         folder + "/step_%04d.png", {.size = size, .frame_count = steps, .opaque = true});
     if (!sink.ok()) return sink.status();
     Result<ContactSheet> sheet = ContactSheet::create(
@@ -75,10 +77,10 @@ class Strip final : public AvatarSampler::Trace {
 
   Status after_step(uint32_t step, double, const SampledAvatar& avatar) override {
     FIG_RETURN_IF_ERROR(check_interrupt());
-    const Result<Portrait> portrait = draw(avatar.avatar(), *body_, Precision::kFixedPoint);
-    if (!portrait.ok()) return portrait.status();
-    sheet_.offer(step - 1, portrait->frame.u8);
-    return sink_->add(portrait->frame);
+    const Result<GoldenPicture> picture = draw(avatar.avatar(), *body_, Precision::kFixedPoint);
+    if (!picture.ok()) return picture.status();
+    sheet_.offer(step - 1, picture->frame.u8);
+    return sink_->add(picture->frame);
   }
 
   Status finish() {
@@ -87,8 +89,7 @@ class Strip final : public AvatarSampler::Trace {
   }
 
  private:
-  Strip(std::string folder, const Package& body, std::unique_ptr<FrameSink> sink,
-        ContactSheet sheet)
+  Strip(std::string folder, const Package& body, std::unique_ptr<FileSink> sink, ContactSheet sheet)
       : folder_(std::move(folder)),
         body_(&body),
         sink_(std::move(sink)),
@@ -96,7 +97,7 @@ class Strip final : public AvatarSampler::Trace {
 
   std::string folder_;
   const Package* body_;
-  std::unique_ptr<FrameSink> sink_;
+  std::unique_ptr<FileSink> sink_;
   ContactSheet sheet_;
 };
 
@@ -134,18 +135,18 @@ std::string default_name(const Sampler& sampler, const SampleRequest& request) {
 // and integers as asked for.
 Result<std::vector<std::byte>> pack(const SampleOptions& options, const LoadedPackage& sampler,
                                     const Package& body, Avatar avatar) {
-  const Result<Portrait> portrait =
+  const Result<GoldenPicture> picture =
       draw(avatar, body, options.precision == "f32" ? Precision::kFloat32 : Precision::kFixedPoint);
-  if (!portrait.ok()) return portrait.status();
+  if (!picture.ok()) return picture.status();
   if (options.precision != "f32") {
-    avatar.golden.fixed_point_hash = hash_picture(portrait->frame.u8.pixels);
+    avatar.golden.fixed_point_hash = hash_picture(picture->frame.u8.pixels);
     avatar.golden.fixed_point_library = network_library();
   } else {
     avatar.fixed_point = {};
   }
   const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, true);
   if (!shapes.ok()) return shapes.status();
-  const Budget budget{.peak_memory_bytes = portrait->memory_bytes,
+  const Budget budget{.peak_memory_bytes = picture->memory_bytes,
                       .macs_per_frame = count_macs(avatar.network, *shapes),
                       .gaussians = body.body().texel_count()};
   if (options.precision == "q8") {
@@ -176,18 +177,18 @@ Status run_sample(SampleOptions options) {
   if (!request.ok()) return request.status();
   options.request = *request;
 
-  const uint64_t start_ns = now_ns();
+  const uint64_t start_ns = ports::now_ns();
   const Result<std::unique_ptr<LoadedPackage>> loaded =
       load_package(options.sampler, PackageKind::kSampler);
   if (!loaded.ok()) return loaded.status();
   const Sampler& from = (*loaded)->package.sampler();
   const Result<std::unique_ptr<AvatarSampler>> sampler = AvatarSampler::create(from);
   if (!sampler.ok()) return sampler.status().within(options.sampler);
-  const uint64_t loaded_ns = now_ns();
+  const uint64_t loaded_ns = ports::now_ns();
 
   SampledAvatar person;
   FIG_RETURN_IF_ERROR((*sampler)->sample(options.request, person).within(options.sampler));
-  const uint64_t sampled_ns = now_ns();
+  const uint64_t sampled_ns = ports::now_ns();
   const uint64_t peak_bytes = peak_memory_bytes();
 
   Avatar avatar = person.avatar();
@@ -270,9 +271,9 @@ Command add_sample_command(CLI::App& app) {
                    "what the avatar holds: fixed point, float weights, or both")
       ->check(CLI::IsMember({"q8", "f32", "f32,q8"}))
       ->capture_default_str();
-  command->add_option(
-      "--body", options->body,
-      "body package; default: found by content hash beside the sampler, then in FIGURINE_PATH");
+  command->add_option("--body", options->body,
+                      "body package; default: found by content hash beside the sampler, in "
+                      "FIGURINE_PATH, in the folders beside");
   command->add_option("--name", options->name,
                       "of the avatar; default: the sampler's name and the seed");
   command->add_option(

@@ -1,19 +1,25 @@
 #include "samples/figurine/sampler_report.h"
 
+#include <algorithm>
 #include <cmath>
+#include <format>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "figurine/avatar_sampler.h"
 #include "figurine/renderer.h"
-#include "ports/linux/png.h"
-#include "samples/figurine/device_options.h"
-#include "samples/figurine/frame_log.h"
-#include "samples/figurine/frame_sink.h"
+#include "ports/host/clock.h"
+#include "ports/media/png.h"
+#include "samples/common/device_options.h"
+#include "samples/common/frame_log.h"
+#include "samples/common/machine.h"
+#include "samples/common/progress.h"
+#include "samples/common/rendered_frame.h"
 #include "samples/figurine/image_error.h"
-#include "samples/figurine/machine.h"
-#include "samples/figurine/progress.h"
 #include "samples/figurine/report_files.h"
 #include "samples/figurine/report_page.h"
 
@@ -48,12 +54,12 @@ struct Setting {
 
 // A person in the golden pose, drawn from its float weights: the rounding to int8 would hide how
 // the error falls.
-class Portraitist {
+class PersonRenderer {
  public:
-  static Result<std::unique_ptr<Portraitist>> create(const LoadedPackage& package,
-                                                     const std::string& body_option) {
+  static Result<std::unique_ptr<PersonRenderer>> create(const LoadedPackage& package,
+                                                        const std::string& body_option) {
     const Sampler& sampler = package.package.sampler();
-    auto made = std::make_unique<Portraitist>();
+    auto made = std::make_unique<PersonRenderer>();
     Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler);
     if (!device.ok()) return device.status().within(package.path);
     made->sampler_ = std::move(*device);
@@ -71,9 +77,9 @@ class Portraitist {
   // ms: of the sampling alone.
   Result<ports::ImageF32> draw(const SampleRequest& request, double* ms) {
     SampledAvatar person;
-    const uint64_t start_ns = now_ns();
+    const uint64_t start_ns = ports::now_ns();
     FIG_RETURN_IF_ERROR(sampler_->sample(request, person));
-    if (ms != nullptr) *ms = static_cast<double>(now_ns() - start_ns) * 1e-6;
+    if (ms != nullptr) *ms = static_cast<double>(ports::now_ns() - start_ns) * 1e-6;
     Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1});
     if (!renderer.ok()) return renderer.status();
     const Result<AvatarId> id =
@@ -114,19 +120,44 @@ Result<ReportPicture> shown(const std::string& caption, const ports::ImageF32& p
 
 Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
-double order_between(const Setting& coarse, uint32_t coarse_evaluations, const Setting& fine,
-                     uint32_t fine_evaluations) {
-  return std::log(coarse.error.rmse() / fine.error.rmse()) /
-         std::log(double(fine_evaluations) / coarse_evaluations);
+// Slope of log error over log step between two settings, coarse and fine.
+double order_between(const std::vector<Setting>& settings, size_t coarse, size_t fine) {
+  return std::log(settings[coarse].error.rmse() / settings[fine].error.rmse()) /
+         std::log(double(kEvaluations[fine]) / kEvaluations[coarse]);
+}
+
+// What more evaluations do not buy: the integers' rounding, and the reference's own error. The
+// smallest error that any setting of any solver reaches.
+double noise_floor(const std::vector<std::vector<Setting>>& solvers) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::vector<Setting>& settings : solvers) {
+    for (const Setting& setting : settings) least = std::min(least, setting.error.rmse());
+  }
+  return least;
+}
+
+// Settings [first, last] over which a solver's order can be observed: the three finest whose error
+// is at least four times the floor, which is then 3 % of it. Coarser ones have steps too large for
+// the theory. None where fewer are above the floor.
+std::optional<std::pair<size_t, size_t>> observable(const std::vector<Setting>& settings,
+                                                    double floor) {
+  constexpr double kAboveFloor = 4;
+  constexpr size_t kSettings = 3;
+  size_t end = settings.size();
+  while (end > 0 && !(settings[end - 1].error.rmse() > kAboveFloor * floor)) --end;
+  if (end < kSettings) return std::nullopt;
+  return std::pair(end - kSettings, end - 1);
 }
 
 Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs,
-               const std::vector<Setting>& settings) {
+               const std::vector<Setting>& settings, double floor) {
   Json json = {{"name", std::string("step of ") + to_string(solver.method)},
                {"meaning", solver.meaning},
                {"theoretical_order", solver.order},
                {"theory", solver.theory},
                {"observed_order", nullptr},
+               {"observed_over", nullptr},
+               {"noise_floor", floor},
                {"stages", {"sampling"}},
                {"settings", Json::array()}};
   for (size_t s = 0; s < settings.size(); ++s) {
@@ -138,20 +169,18 @@ Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs,
                 {"rmse", setting.error.rmse()},
                 {"largest", setting.error.largest},
                 {"observed_order", nullptr}};
-    if (s > 0 && setting.error.squared > 0 && settings[s - 1].error.squared > 0) {
-      row["observed_order"] =
-          order_between(settings[s - 1], kEvaluations[s - 1], setting, kEvaluations[s]);
-    }
+    if (s > 0 && setting.error.squared > 0 && settings[s - 1].error.squared > 0)
+      row["observed_order"] = order_between(settings, s - 1, s);
     const Summary cost_ms = summarise(setting.ms);
     row["cost_ms"] = {{"median", cost_ms.median}, {"p90", cost_ms.p90}};
     row["work"] = {{"evaluations", kEvaluations[s]}, {"macs", macs * kEvaluations[s]}};
     json["settings"].push_back(std::move(row));
   }
-  const Setting &coarse = settings[settings.size() - 4],
-                &fine = settings.back();  // 20 to 250: where the steps are small
-  if (coarse.error.squared > 0 && fine.error.squared > 0) {
-    json["observed_order"] = order_between(coarse, kEvaluations[settings.size() - 4], fine,
-                                           kEvaluations[settings.size() - 1]);
+  if (const auto range = observable(settings, floor)) {
+    const auto [first, last] = *range;
+    json["observed_order"] = order_between(settings, first, last);
+    json["observed_over"] = std::format("{} to {} evaluations, above the noise floor of {:.1e}",
+                                        kEvaluations[first], kEvaluations[last], floor);
   }
   return json;
 }
@@ -160,9 +189,9 @@ Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs,
 
 Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptions& options) {
   const Sampler& sampler = package.package.sampler();
-  Result<std::unique_ptr<Portraitist>> made = Portraitist::create(package, options.body);
+  Result<std::unique_ptr<PersonRenderer>> made = PersonRenderer::create(package, options.body);
   if (!made.ok()) return made.status();
-  Portraitist& portraitist = **made;
+  PersonRenderer& people = **made;
   std::vector<std::vector<Setting>> settings(std::size(kSolvers),
                                              std::vector<Setting>(std::size(kEvaluations)));
   std::vector<ReportPicture> pictures;
@@ -170,13 +199,13 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   uint64_t done = 0;
   for (uint64_t seed = 0; seed < options.seeds; ++seed) {
     const Result<ports::ImageF32> truth =
-        portraitist.draw({.seed = seed, .steps = kReferenceEvaluations}, nullptr);
+        people.draw({.seed = seed, .steps = kReferenceEvaluations}, nullptr);
     if (!truth.ok()) return truth.status();
     for (size_t s = 0; s < std::size(kEvaluations); ++s) {
       for (size_t m = 0; m < std::size(kSolvers); ++m) {
         FIG_RETURN_IF_ERROR(check_interrupt());
         double ms = 0;
-        const Result<ports::ImageF32> picture = portraitist.draw(
+        const Result<ports::ImageF32> picture = people.draw(
             {.seed = seed, .steps = kEvaluations[s], .method = kSolvers[m].method}, &ms);
         if (!picture.ok()) return picture.status();
         add_foreground_error(*truth, *picture, settings[m][s].error);
@@ -199,7 +228,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   }
 
   Json json = json_header("report");
-  json["date"] = date_utc();
+  json["date"] = ports::date_utc();
   json["machine"] = {{"cpu", cpu_name()},
                      {"cpus", usable_cpus()},
                      {"threads", 1},
@@ -207,7 +236,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
                      {"isa", "scalar"}};
   json["sampler"] = package.path;
   json["seeds"] = options.seeds;
-  json["size"] = {portraitist.golden().camera.width_px, portraitist.golden().camera.height_px};
+  json["size"] = {people.golden().camera.width_px, people.golden().camera.height_px};
   json["reference"] = {
       {"evaluations", kReferenceEvaluations},
       {"meaning", "the same seeds in 500 evaluations of DPM-Solver++(2M) by the same integers"}};
@@ -220,9 +249,10 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   json["timing"] =
       "median over the seeds of one sampling, noise to weights in integers; solvers take turns";
   json["dials"] = Json::array();
+  const double floor = noise_floor(settings);
   for (size_t m = 0; m < std::size(kSolvers); ++m) {
-    json["dials"].push_back(
-        dial_json(kSolvers[m], sampler, portraitist.sampler().macs_per_evaluation(), settings[m]));
+    json["dials"].push_back(dial_json(kSolvers[m], sampler, people.sampler().macs_per_evaluation(),
+                                      settings[m], floor));
   }
   FIG_RETURN_IF_ERROR(write_report(options.output, json, report_html(json, pictures)));
   if (options.json) print_json(json);

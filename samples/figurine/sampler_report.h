@@ -5,7 +5,7 @@
 #include <string>
 
 #include "figurine/status.h"
-#include "samples/figurine/loading.h"
+#include "samples/common/loading.h"
 
 namespace figurine::samples {
 

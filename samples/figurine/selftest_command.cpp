@@ -11,15 +11,15 @@
 #include <vector>
 
 #include "figurine/avatar_sampler.h"
-#include "ports/linux/png.h"
-#include "samples/figurine/cast.h"
+#include "ports/media/png.h"
+#include "samples/common/device_options.h"
+#include "samples/common/loading.h"
+#include "samples/common/machine.h"
+#include "samples/common/progress.h"
+#include "samples/common/rendered_frame.h"
+#include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/device_options.h"
-#include "samples/figurine/frame_sink.h"
 #include "samples/figurine/image_error.h"
-#include "samples/figurine/loading.h"
-#include "samples/figurine/machine.h"
-#include "samples/figurine/progress.h"
 
 namespace figurine::samples {
 
@@ -34,7 +34,7 @@ constexpr double kLeastPsnr_db = 54;
 constexpr int kForegroundLevels = 25;
 
 struct SelftestOptions {
-  CastOptions cast;
+  SceneOptions scene;
   DeviceOptions device;
 };
 
@@ -69,16 +69,16 @@ struct Golden {
 
 Result<Golden> draw_golden(const SelftestOptions& options, const RendererOptions& renderer_options,
                            Precision precision) {
-  Result<Cast> cast = Cast::load(options.cast);
-  if (!cast.ok()) return cast.status();
-  const GoldenFrame& golden = cast->avatar(0).avatar.golden;
+  Result<Scene> scene = Scene::load(options.scene);
+  if (!scene.ok()) return scene.status();
+  const GoldenFrame& golden = scene->avatar(0).avatar.golden;
   Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
   if (!renderer.ok()) return renderer.status();
-  FIG_RETURN_IF_ERROR(cast->add_to(**renderer, precision));
+  FIG_RETURN_IF_ERROR(scene->add_to(**renderer, precision));
   const ImageSize size{golden.camera.width_px, golden.camera.height_px};
   Golden drawn{RenderedFrame(size, PixelFormat::kRgba8),
                RenderedFrame(size, PixelFormat::kRgbaF32)};
-  const std::span<const FrameAvatar> posed = cast->pose(0);
+  const std::span<const FrameAvatar> posed = scene->pose(0);
   FIG_RETURN_IF_ERROR((*renderer)->render(
       {.camera = golden.camera, .avatars = posed, .background = golden.background},
       drawn.picture.target()));
@@ -96,7 +96,7 @@ struct Verdict {
 
 Result<Verdict> compare_floats(const SelftestOptions& options,
                                const RendererOptions& renderer_options, const GoldenFrame& golden) {
-  const std::string& path = options.cast.avatars[0];
+  const std::string& path = options.scene.avatars[0];
   const Result<ports::ImageU8> expected =
       ports::decode_png(std::as_bytes(golden.png), path + ": golden frame");
   if (!expected.ok()) return expected.status();
@@ -153,7 +153,7 @@ Result<Verdict> compare_hashes(const SelftestOptions& options,
 // In every precision asked for that the package has a golden picture of.
 Result<std::vector<Verdict>> judge(const SelftestOptions& options,
                                    const RendererOptions& renderer_options) {
-  const std::string& path = options.cast.avatars[0];
+  const std::string& path = options.scene.avatars[0];
   const Result<std::unique_ptr<LoadedAvatar>> loaded = load_avatar(path);
   if (!loaded.ok()) return loaded.status();
   const Avatar& avatar = (*loaded)->avatar;
@@ -229,13 +229,13 @@ Status run_sampler_selftest(const Package& package, const std::string& path, boo
 
 Status run_selftest(const SelftestOptions& options) {
   // Whatever else it is, or is not, is said by what loads an avatar.
-  if (const auto loaded = load_package(options.cast.avatars[0]);
+  if (const auto loaded = load_package(options.scene.avatars[0]);
       loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
-    return run_sampler_selftest((*loaded)->package, options.cast.avatars[0], options.device.json);
+    return run_sampler_selftest((*loaded)->package, options.scene.avatars[0], options.device.json);
   }
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
-  const std::string& path = options.cast.avatars[0];
+  const std::string& path = options.scene.avatars[0];
   const Result<std::vector<Verdict>> verdicts = judge(options, *renderer_options);
   if (!verdicts.ok()) return verdicts.status();
   const auto failed = std::find_if(verdicts->begin(), verdicts->end(),
@@ -266,15 +266,15 @@ Command add_selftest_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("selftest",
                                          "Compares what this device makes of the golden frame, or "
                                          "of a sampler's golden seeds, with the package's");
-  options->cast.avatars.resize(1);
+  options->scene.avatars.resize(1);
   command
-      ->add_option("avatar", options->cast.avatars[0],
+      ->add_option("avatar", options->scene.avatars[0],
                    "avatar or sampler package (.fgn), or a member of a population "
                    "(people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option(
-      "--body", options->cast.body,
-      "body package; default: found by content hash beside the avatar, then in FIGURINE_PATH");
+  command->add_option("--body", options->scene.body,
+                      "body package; default: found by content hash beside the avatar, in "
+                      "FIGURINE_PATH, in the folders beside");
   options->device.add_to(*command);
   return {command, [options] { return run_selftest(*options); }};
 }

@@ -4,14 +4,17 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "ports/linux/files.h"
-#include "samples/figurine/camera_spec.h"
+#include "ports/host/clock.h"
+#include "ports/host/files.h"
+#include "samples/common/camera_matrix.h"
+#include "samples/common/camera_spec.h"
+#include "samples/common/device_options.h"
+#include "samples/common/file_sink.h"
+#include "samples/common/frame_log.h"
+#include "samples/common/framing.h"
+#include "samples/common/machine.h"
+#include "samples/common/rendered_frame.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/device_options.h"
-#include "samples/figurine/frame_log.h"
-#include "samples/figurine/frame_sink.h"
-#include "samples/figurine/framing.h"
-#include "samples/figurine/machine.h"
 #include "samples/gaussians/ply.h"
 
 namespace figurine::samples {
@@ -31,26 +34,25 @@ constexpr ImageSize kDefaultSize{1024, 768};
 constexpr FramingOptions kSceneFraming{.share = 0.9, .margin = 0.05};
 constexpr float kOpacitySeen = 0.1f;
 
-// Rows of the rotation that turns the file's up axis into +y.
-std::array<float, 9> upright(const std::string& up) {
-  if (up == "-y") return {1, 0, 0, 0, -1, 0, 0, 0, -1};
-  if (up == "+z") return {1, 0, 0, 0, 0, 1, 0, -1, 0};
-  if (up == "-z") return {1, 0, 0, 0, 0, -1, 0, 1, 0};
-  return {1, 0, 0, 0, 1, 0, 0, 0, 1};
+// The rotation that turns the file's up axis into +y.
+glm::mat3 upright(const std::string& up) {
+  constexpr glm::vec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+  if (up == "-y") return {x, -y, -z};
+  if (up == "+z") return {x, -z, y};
+  if (up == "-z") return {x, z, -y};
+  return {x, y, z};
 }
 
 // An orbit around the scene's robust centre, in its own axes.
 Result<Camera> orbit_scene(const GaussianCloud& cloud, std::optional<OrbitCamera> wanted,
                            const std::string& up, ImageSize size) {
-  const std::array<float, 9> turn = upright(up);
+  const glm::mat3 turn = upright(up);
   std::vector<Point> points;
   for (uint32_t i = 0; i < cloud.count(); ++i) {
     if (!(cloud.opacity[i] >= kOpacitySeen)) continue;
     const float* p = &cloud.position_m[3 * size_t(i)];
-    Point point;
-    for (int r = 0; r < 3; ++r)
-      point[r] = turn[3 * r] * p[0] + turn[3 * r + 1] * p[1] + turn[3 * r + 2] * p[2];
-    points.push_back(point);
+    const glm::vec3 point = turn * glm::make_vec3(p);
+    points.push_back({point.x, point.y, point.z});
   }
   OrbitCamera orbit = wanted.value_or(OrbitCamera{.azimuth_deg = 25, .elevation_deg = 12});
   orbit.target_m = robust_centre(points, kSceneFraming.share);
@@ -59,13 +61,7 @@ Result<Camera> orbit_scene(const GaussianCloud& cloud, std::optional<OrbitCamera
         points, orbit, static_cast<double>(size.width_px) / size.height_px, kSceneFraming);
   Result<Camera> camera = make_orbit_camera(orbit, size.width_px, size.height_px);
   if (!camera.ok()) return camera;
-  const std::array<float, 12> view = camera->view_from_world;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      camera->view_from_world[4 * r + c] =
-          view[4 * r] * turn[c] + view[4 * r + 1] * turn[3 + c] + view[4 * r + 2] * turn[6 + c];
-    }
-  }
+  set_view_matrix(*camera, view_matrix(*camera) * glm::mat4(turn));
   return camera;
 }
 
@@ -118,7 +114,7 @@ Status run_splat(const SplatCommandOptions& options) {
   const Result<Camera> camera = choose_camera(options, *cloud);
   if (!camera.ok()) return camera.status();
   const ImageSize size{camera->width_px, camera->height_px};
-  Result<std::unique_ptr<FrameSink>> sink = FrameSink::create(
+  Result<std::unique_ptr<FileSink>> sink = FileSink::create(
       options.output, {.size = size, .frame_count = 1, .opaque = background->colour.has_value()});
   if (!sink.ok()) return sink.status();
 
@@ -127,13 +123,13 @@ Status run_splat(const SplatCommandOptions& options) {
   RenderedFrame frame(size, (*sink)->format());
   const GaussianView gaussians[] = {cloud->view()};
   FrameLog log;
-  const uint64_t start_ns = now_ns();
+  const uint64_t start_ns = ports::now_ns();
   FIG_RETURN_IF_ERROR((*renderer)->render({.camera = *camera,
                                            .gaussians = gaussians,
                                            .background = background->colour,
                                            .splat = {.alpha_cut = options.alpha_cut}},
                                           frame.target()));
-  log.add((*renderer)->statistics(), now_ns() - start_ns);
+  log.add((*renderer)->statistics(), ports::now_ns() - start_ns);
   FIG_RETURN_IF_ERROR((*sink)->add(frame));
   FIG_RETURN_IF_ERROR((*sink)->finish());
 

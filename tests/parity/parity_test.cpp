@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "ports/linux/png.h"
+#include "ports/media/png.h"
 #include "tests/toolchain/train/small_capture.h"
 #include "toolchain/evaluate/requantization.h"
 #include "toolchain/quantize/calibration.h"

@@ -43,7 +43,7 @@ class CheckGolden(unittest.TestCase):
         (self.root / "scripts").mkdir()
         shutil.copy(ROOT / "scripts" / "check_golden", self.root / "scripts")
         for preset in ["dev", "aarch64"]:
-            self.program(f"build/{preset}/formats/figurine-inspect", INSPECT)
+            self.program(f"build/{preset}/samples/inspect/figurine-inspect", INSPECT)
             self.program(f"build/{preset}/samples/figurine/figurine", FIGURINE)
             self.program(f"build/{preset}/tests/runtime/golden_frame_test", STAGES)
         self.program("bin/qemu-x86_64", 'MODEL=$2; shift 2; export MODEL; exec "$@"')

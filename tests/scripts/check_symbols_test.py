@@ -14,7 +14,7 @@ ARCHIVES = [
     "formats/libfigurine_formats.a",
     "formats/libfigurine_words.a",
 ]
-PROGRAMS = ["samples/figurine/figurine", "formats/figurine-inspect"]
+PROGRAMS = ["samples/figurine/figurine", "samples/inspect/figurine-inspect"]
 SOUND = '#include <cstdlib>\nvoid* memory(unsigned long n) { return std::malloc(n); }\n'
 PROGRAM = "int main() { return 0; }\n"
 

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "tests/stability/rows.h"
 
 namespace figurine::stability {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "figurine/package.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/bvh.h"
 #include "toolchain/error.h"
 

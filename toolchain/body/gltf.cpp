@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/error.h"
 
 namespace figurine::body {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "figurine/package.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/skeleton.h"
 #include "toolchain/error.h"
 

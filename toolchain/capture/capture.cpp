@@ -30,7 +30,7 @@ struct Session {
   Person person;
   std::vector<float> joints_m;  // [J,3] of the person's own shape
   std::vector<CapturedPose> sequence;
-  std::vector<RigCamera> rig;
+  std::vector<RingCamera> cameras;
   IdentityRecord record;
 
   std::vector<Affine> transforms(size_t frame, const Body& body) const {
@@ -88,7 +88,7 @@ Session prepare(const CaptureRequest& request, uint32_t identity, const Package&
   const std::array<float, 3> root{session.joints_m[0], session.joints_m[1], session.joints_m[2]};
   session.sequence =
       make_sequence(motions, {.frames = request.frames, .seed = person.seed, .root_rest_m = root});
-  session.rig = make_rig(request.rig, place_poses(session, body));
+  session.cameras = make_camera_rings(request.cameras, place_poses(session, body));
   session.record = {.identity = identity,
                     .seed = request.seed,
                     .tool = request.tool,
@@ -143,12 +143,12 @@ void photograph(const Session& session, const IdentityLayout& layout, const Body
       std::optional<Renderer> renderer;
       for (size_t frame; (frame = next++) < session.sequence.size() && !tally.stopped();) {
         bool posed = false;
-        for (size_t camera = 0; camera < session.rig.size() && !tally.stopped(); ++camera) {
+        for (size_t camera = 0; camera < session.cameras.size() && !tally.stopped(); ++camera) {
           if (!layout.has_image(frame, camera)) {
             if (!renderer) renderer.emplace(session.person, folds);
             if (!posed) renderer->set_pose(session.transforms(frame, body));
             posed = true;
-            layout.write_image(frame, camera, renderer->render(session.rig[camera].camera));
+            layout.write_image(frame, camera, renderer->render(session.cameras[camera].camera));
           }
           tally.count(1);
         }
@@ -186,13 +186,13 @@ CaptureEnd capture_identities(const CaptureRequest& request, const Package& pack
     throw InputError("--body: captures are made of a makehuman or mannequin body, not of '" +
                      body.name + "'");
   }
-  Tally tally(callback, uint64_t{request.identities} * request.frames * request.rig.views);
+  Tally tally(callback, uint64_t{request.identities} * request.frames * request.cameras.views);
   for (uint32_t i = 0; i < request.identities && !tally.stopped(); ++i) {
     const uint32_t identity = request.first_identity + i;
     const Session session =
         prepare(request, identity, package, makehuman ? &*makehuman : nullptr, motions);
     IdentityLayout layout(request.output + "/" + identity_name(identity), session.record,
-                          session.person, session.rig, session.sequence);
+                          session.person, session.cameras, session.sequence);
     layout.begin(request.resume);
     photograph(session, layout, body, request.folds, request.threads, tally);
     tally.rethrow();

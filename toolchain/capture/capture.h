@@ -1,4 +1,4 @@
-// Makes captures: a person from a seed, posed by motions, photographed by a rig of cameras, written
+// Makes captures: a person from a seed, posed by motions, photographed by rings of cameras, written
 // in MVHumanNet's layout (docs/capture.md).
 //
 // The same request gives the same bytes for any number of threads. Files appear whole;
@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "figurine/package.h"
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 #include "toolchain/body/motion_clip.h"
+#include "toolchain/capture/camera_rings.h"
 #include "toolchain/capture/folds.h"
-#include "toolchain/capture/rig.h"
 #include "toolchain/capture/wardrobe.h"
 
 namespace figurine::capture {
@@ -27,7 +27,7 @@ struct CaptureRequest {
       0;  // identities are numbered from 0; each depends on (seed, number) alone
   uint32_t identities = 1;
   uint32_t frames = 119;
-  RigOptions rig;
+  CameraRingsOptions cameras;
   bool resume = false;  // go on where an interrupted run of the same request stopped
   uint32_t threads = 1;
   FoldMode folds = FoldMode::kPose;

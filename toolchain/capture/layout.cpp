@@ -11,8 +11,8 @@
 #include <cstring>
 #include <filesystem>
 
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
 #include "toolchain/body/skeleton.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
@@ -156,11 +156,11 @@ std::string numbered(const char* format, uint32_t number) {
 }  // namespace
 
 IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& record,
-                               const Person& person, const std::vector<RigCamera>& rig,
+                               const Person& person, const std::vector<RingCamera>& cameras,
                                const std::vector<CapturedPose>& sequence)
     : directory_(std::move(directory)),
       root_rest_m_(record.root_rest_m),
-      rig_(rig),
+      cameras_(cameras),
       sequence_(sequence) {
   about_["version"] = 1;
   about_["complete"] = false;
@@ -172,8 +172,8 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
   about_["units"] =
       "metres, y up; rotations are quaternions wxyz relative to the parent, rest frames are "
       "world-aligned";
-  about_["image"] = {{"width", rig[0].camera.width_px},
-                     {"height", rig[0].camera.height_px},
+  about_["image"] = {{"width", cameras[0].camera.width_px},
+                     {"height", cameras[0].camera.height_px},
                      {"jpeg_quality", kJpegQuality}};
   about_["shape"] = decimals(person.shape);
   about_["shape_error_m"] = decimal(static_cast<float>(person.shape_error_m));
@@ -188,10 +188,10 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
                       {"hair", record.limits.hair}};
   about_["sources"] = record.sources;
   const dataset::Split split = dataset::default_split(static_cast<uint32_t>(sequence.size()),
-                                                      static_cast<uint32_t>(rig.size()));
+                                                      static_cast<uint32_t>(cameras.size()));
   about_["held_out_cameras"] = ordered_json::array();
-  for (size_t c = 0; c < rig.size(); ++c) {
-    if (split.held_out_camera[c]) about_["held_out_cameras"].push_back(rig[c].name);
+  for (size_t c = 0; c < cameras.size(); ++c) {
+    if (split.held_out_camera[c]) about_["held_out_cameras"].push_back(cameras[c].name);
   }
   about_["joints"] = body::joint_names();
   about_["frames"] = ordered_json::array();
@@ -208,12 +208,12 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
 }
 
 std::string IdentityLayout::image_path(size_t frame, size_t camera) const {
-  return directory_ + "/images_lr/" + rig_[camera].name + "/" +
+  return directory_ + "/images_lr/" + cameras_[camera].name + "/" +
          numbered("%04u_img.jpg", frame_number(frame));
 }
 
 std::string IdentityLayout::mask_path(size_t frame, size_t camera) const {
-  return directory_ + "/fmask_lr/" + rig_[camera].name + "/" +
+  return directory_ + "/fmask_lr/" + cameras_[camera].name + "/" +
          numbered("%04u_img_fmask.png", frame_number(frame));
 }
 
@@ -239,7 +239,7 @@ void IdentityLayout::begin(bool resume) {
                        ": is of a capture with other settings; --resume needs the same command");
   }
   std::error_code error;
-  for (const RigCamera& entry : rig_) {
+  for (const RingCamera& entry : cameras_) {
     for (const char* kind : {"/images_lr/", "/fmask_lr/"}) {
       fs::create_directories(directory_ + kind + entry.name, error);
       if (error) throw InputError(directory_ + kind + entry.name + ": " + error.message());
@@ -250,7 +250,7 @@ void IdentityLayout::begin(bool resume) {
   if (fs::exists(about_path)) return;
 
   ordered_json extrinsics = ordered_json::object();
-  for (const RigCamera& entry : rig_) {
+  for (const RingCamera& entry : cameras_) {
     const Camera& camera = entry.camera;
     ordered_json rotation = ordered_json::array(), translation = ordered_json::array();
     for (int row = 0; row < 3; ++row) {
@@ -265,7 +265,7 @@ void IdentityLayout::begin(bool resume) {
         {"translation", translation}};
   }
   write_json(directory_ + "/camera_extrinsics.json", extrinsics);
-  const Camera& one = rig_[0].camera;  // the rig's cameras share their intrinsics
+  const Camera& one = cameras_[0].camera;  // the cameras share their intrinsics
   const double fx = 2 * decimal(one.fx_px), fy = 2 * decimal(one.fy_px),
                cx = 2 * decimal(one.cx_px), cy = 2 * decimal(one.cy_px);
   write_json(directory_ + "/camera_intrinsics.json",

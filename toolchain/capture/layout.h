@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "figurine/pose.h"
+#include "toolchain/capture/camera_rings.h"
 #include "toolchain/capture/mesh.h"
 #include "toolchain/capture/renderer.h"
-#include "toolchain/capture/rig.h"
 #include "toolchain/capture/sequence.h"
 #include "toolchain/capture/wardrobe.h"
 
@@ -33,7 +33,7 @@ class IdentityLayout {
   // directory is made if it is not there. InputError if it holds a capture of another request, or
   // one at all without `resume`.
   IdentityLayout(std::string directory, const IdentityRecord& record, const Person& person,
-                 const std::vector<RigCamera>& rig, const std::vector<CapturedPose>& sequence);
+                 const std::vector<RingCamera>& cameras, const std::vector<CapturedPose>& sequence);
 
   // Cameras, poses and figurine.json (complete: false), as far as not there yet.
   void begin(bool resume);
@@ -50,7 +50,7 @@ class IdentityLayout {
   std::string directory_;
   std::array<float, 3> root_rest_m_;
   nlohmann::ordered_json about_;  // figurine.json
-  const std::vector<RigCamera>& rig_;
+  const std::vector<RingCamera>& cameras_;
   const std::vector<CapturedPose>& sequence_;
 };
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/skin.h"
 #include "toolchain/error.h"
 

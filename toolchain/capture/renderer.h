@@ -19,7 +19,7 @@
 
 #include "figurine/camera.h"
 #include "figurine/pose.h"
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 #include "toolchain/capture/folds.h"
 #include "toolchain/capture/mesh.h"
 

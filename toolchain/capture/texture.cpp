@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
 #include "toolchain/error.h"
 
 namespace figurine::capture {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 #include "toolchain/capture/vec.h"
 
 namespace figurine::capture {

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "formats/writer/package_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/makehuman_model.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/smplx.h"

@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "figurine/package.h"
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
 #include "toolchain/body/clip.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/cli/commands.h"
@@ -74,15 +74,15 @@ class ImageBar {
   std::chrono::steady_clock::time_point start_;
 };
 
-void parse_size(const std::string& text, capture::RigOptions& rig) {
+void parse_size(const std::string& text, capture::CameraRingsOptions& cameras) {
   unsigned width = 0, height = 0;
   char rest = 0;
   if (std::sscanf(text.c_str(), "%ux%u%c", &width, &height, &rest) != 2 || width < 16 ||
       height < 16 || width > 8192 || height > 8192) {
     throw InputError("--size: '" + text + "' is not WxH with sides from 16 to 8192");
   }
-  rig.width_px = width;
-  rig.height_px = height;
+  cameras.width_px = width;
+  cameras.height_px = height;
 }
 
 capture::FoldMode parse_folds(const std::string& text) {
@@ -116,7 +116,7 @@ void write_sheet(const CaptureOptions& options) {
 
 void run_capture(CaptureOptions options) {
   capture::CaptureRequest& request = options.request;
-  parse_size(options.size, request.rig);
+  parse_size(options.size, request.cameras);
   request.folds = parse_folds(options.folds);
   const ports::MappedFile file =
       value_or_throw(ports::MappedFile::open(options.body), options.body);
@@ -194,7 +194,7 @@ void add_capture_command(CLI::App& app) {
   command->add_option("--identity", options->identity, "Only this one of them")
       ->check(CLI::Range(0, 99'999));
   command->add_option("--seed", request.seed, "The same seed gives the same bytes");
-  command->add_option("--views", request.rig.views, "Cameras")->check(CLI::Range(1u, 200u));
+  command->add_option("--views", request.cameras.views, "Cameras")->check(CLI::Range(1u, 200u));
   command->add_option("--frames", request.frames, "Poses a person")->check(CLI::Range(1u, 10'000u));
   command->add_option("--size", options->size, "WxH of the images")->capture_default_str();
   command->add_option(

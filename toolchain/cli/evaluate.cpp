@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/contact_sheet.h"

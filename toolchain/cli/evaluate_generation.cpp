@@ -13,7 +13,7 @@
 #include <optional>
 #include <thread>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/captured_people.h"

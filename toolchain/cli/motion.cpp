@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "formats/writer/package_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/clip.h"
 #include "toolchain/body/motion_loop.h"
 #include "toolchain/body/retarget.h"

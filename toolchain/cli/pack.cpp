@@ -7,7 +7,7 @@
 #include <optional>
 #include <thread>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
 #include "toolchain/generate/pack_sampler.h"

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/error.h"
 #include "toolchain/train/csv.h"
 #include "toolchain/train/progress.h"

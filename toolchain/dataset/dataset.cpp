@@ -10,8 +10,8 @@
 #include <optional>
 #include <set>
 
-#include "ports/linux/files.h"
-#include "ports/linux/png.h"
+#include "ports/host/files.h"
+#include "ports/media/png.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/dataset/json_fields.h"
 #include "toolchain/error.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 
 namespace figurine::dataset {
 

@@ -89,11 +89,11 @@ std::vector<Picture> CapturedPeople::photograph(const MemberSet& set, size_t mem
   capture::Renderer renderer(person);
   std::vector<Picture> pictures;
   for (size_t shot = 0; shot < kComparedShots; ++shot) {
-    if (shot == 0 || set.studio.shots()[shot].pose != set.studio.shots()[shot - 1].pose) {
-      skinning_transforms({body.parents, joints_m}, set.studio.pose(shot), world_from_rest);
+    if (shot == 0 || set.renderer.shots()[shot].pose != set.renderer.shots()[shot - 1].pose) {
+      skinning_transforms({body.parents, joints_m}, set.renderer.pose(shot), world_from_rest);
       renderer.set_pose(world_from_rest);
     }
-    pictures.push_back(join(renderer.render(set.studio.camera(shot))));
+    pictures.push_back(join(renderer.render(set.renderer.camera(shot))));
   }
   return pictures;
 }

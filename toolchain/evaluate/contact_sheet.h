@@ -8,7 +8,7 @@
 // sharpened.
 #pragma once
 
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 #include "toolchain/train/trained_avatar.h"
 
 namespace figurine::evaluate {

@@ -2,7 +2,7 @@
 
 #include "figurine/check.h"
 #include "figurine/package.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/figurine_features.h"
 #include "toolchain/evaluate/solo_threads.h"

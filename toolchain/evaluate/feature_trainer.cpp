@@ -9,11 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/figurine_features.h"
 #include "toolchain/evaluate/perceptual_embedding.h"
-#include "toolchain/evaluate/posed_studio.h"
+#include "toolchain/evaluate/posed_members.h"
 #include "toolchain/evaluate/solo_threads.h"
 #include "toolchain/model/optimiser.h"
 #include "toolchain/train/flat_tensor.h"
@@ -82,20 +82,20 @@ struct PictureBank {
   torch::Tensor values;  // uint8
 };
 
-PictureBank draw_bank(const PosedStudio& studio, const std::vector<size_t>& members) {
-  PictureBank bank{members.size(), studio.shots(), {}};
+PictureBank draw_bank(const PosedMembers& posed, const std::vector<size_t>& members) {
+  PictureBank bank{members.size(), posed.shots(), {}};
   bank.values = torch::empty(
       {static_cast<int64_t>(bank.members * bank.shots), 3, kFeatureSide_px, kFeatureSide_px},
       torch::kUInt8);
-  studio.draw("drawing training members", members,
-              [&](size_t i, const std::vector<Picture>& pictures) {
-                const RgbPictures colours = over_grey(pictures);
-                for (size_t shot = 0; shot < bank.shots; ++shot) {
-                  const torch::Tensor bytes =
-                      (prepare_for_features(colours[shot]) * 255).round().to(torch::kUInt8);
-                  bank.values[static_cast<int64_t>(i * bank.shots + shot)].copy_(bytes[0]);
-                }
-              });
+  posed.draw("drawing training members", members,
+             [&](size_t i, const std::vector<Picture>& pictures) {
+               const RgbPictures colours = over_grey(pictures);
+               for (size_t shot = 0; shot < bank.shots; ++shot) {
+                 const torch::Tensor bytes =
+                     (prepare_for_features(colours[shot]) * 255).round().to(torch::kUInt8);
+                 bank.values[static_cast<int64_t>(i * bank.shots + shot)].copy_(bytes[0]);
+               }
+             });
   return bank;
 }
 
@@ -443,14 +443,14 @@ FeatureResult train_features(const FeatureRequest& request) {
       describe(request, settings, population, body, members);
   if (motion) provenance["motion_hash"] = format_hash(motion->package.content_hash());
   if (begun) check_same(provenance, state, checkpoint);
-  const PosedStudio studio(population.package, body.package,
+  const PosedMembers posed(population.package, body.package,
                            {.motion = motion ? &motion->package.motion() : nullptr,
                             .poses = settings.poses,
                             .views = settings.views,
                             .seed = settings.seed,
                             .threads = request.threads,
                             .quiet = request.quiet});
-  const PictureBank bank = draw_bank(studio, members);
+  const PictureBank bank = draw_bank(posed, members);
   FeatureTrainer trainer(request, settings, bank, std::move(provenance));
   if (begun) trainer.take_checkpoint(state, checkpoint);
   return trainer.run();

@@ -142,7 +142,8 @@ void Extent::add(const Extent& other) {
   top = std::min(top, other.top), bottom = std::max(bottom, other.bottom);
 }
 
-Studio::Studio(const Package& body, std::vector<train::OwnedPose> poses, std::vector<Shot> shots)
+ShotRenderer::ShotRenderer(const Package& body, std::vector<train::OwnedPose> poses,
+                           std::vector<Shot> shots)
     : body_(&body), poses_(std::move(poses)), shots_(std::move(shots)) {
   for (const Shot& shot : shots_)
     cameras_.push_back(unframed_camera(shot, poses_[shot.pose], body.body()));
@@ -150,7 +151,7 @@ Studio::Studio(const Package& body, std::vector<train::OwnedPose> poses, std::ve
 
 // visit(shot, posed avatar, how far up it is moved); the network runs where the pose changes.
 template <class Visit>
-void Studio::each_shot(const Avatar& avatar, size_t first, size_t end, Visit&& visit) const {
+void ShotRenderer::each_shot(const Avatar& avatar, size_t first, size_t end, Visit&& visit) const {
   verify::DeviceAvatar device(avatar, *body_);
   for (size_t i = first; i < end; ++i) {
     if (i == first || shots_[i].pose != shots_[i - 1].pose)
@@ -159,7 +160,7 @@ void Studio::each_shot(const Avatar& avatar, size_t first, size_t end, Visit&& v
   }
 }
 
-std::vector<Extent> Studio::look(const Avatar& avatar) const {
+std::vector<Extent> ShotRenderer::look(const Avatar& avatar) const {
   std::vector<Extent> extents(shots_.size());
   each_shot(avatar, 0, shots_.size(), [&](size_t shot, verify::DeviceAvatar& device, float up_m) {
     extents[shot] = extent_of(cameras_[shot], device.centres_m(), up_m);
@@ -167,8 +168,8 @@ std::vector<Extent> Studio::look(const Avatar& avatar) const {
   return extents;
 }
 
-void Studio::frame(size_t shot, const Extent& extent, uint32_t width_px, uint32_t height_px,
-                   float margin) {
+void ShotRenderer::frame(size_t shot, const Extent& extent, uint32_t width_px, uint32_t height_px,
+                         float margin) {
   const float width = static_cast<float>(width_px), height = static_cast<float>(height_px);
   const float inside = 1 - 2 * margin;
   const float focal_px = std::min(width * inside / (extent.right - extent.left),
@@ -181,7 +182,7 @@ void Studio::frame(size_t shot, const Extent& extent, uint32_t width_px, uint32_
   camera.cy_px = 0.5f * height - focal_px * 0.5f * (extent.top + extent.bottom);
 }
 
-std::vector<Picture> Studio::draw(const Avatar& avatar, size_t first, size_t end) const {
+std::vector<Picture> ShotRenderer::draw(const Avatar& avatar, size_t first, size_t end) const {
   std::vector<Picture> pictures;
   each_shot(avatar, first, end, [&](size_t shot, verify::DeviceAvatar& device, float up_m) {
     pictures.push_back(device.draw(cameras_[shot], {0, up_m, 0}));

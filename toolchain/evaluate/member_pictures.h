@@ -52,9 +52,9 @@ struct Extent {
   float aspect() const { return (right - left) / (bottom - top); }  // width over height
 };
 
-class Studio {
+class ShotRenderer {
  public:
-  Studio(const Package& body, std::vector<train::OwnedPose> poses, std::vector<Shot> shots);
+  ShotRenderer(const Package& body, std::vector<train::OwnedPose> poses, std::vector<Shot> shots);
 
   const std::vector<Shot>& shots() const { return shots_; }
   PoseView pose(size_t shot) const { return poses_[shots_[shot].pose].view(); }

@@ -97,25 +97,25 @@ MemberSet::MemberSet(const Package& population_package, const Package& body_pack
         held_out_z = made.standardise(rows_of(weights, held_out));
         return made;
       }()),
-      studio(body_package, fixed_poses(population(), options.motion, 2), make_shots()),
+      renderer(body_package, fixed_poses(population(), options.motion, 2), make_shots()),
       picture_px(std::clamp(2 * population().network.input_size, 128u, 256u)),
       pictures(population().size()) {
-  frame_studio();
+  frame_shots();
   crew.run("drawing members", population().size(),
            [&](size_t m) { pictures[m] = draw(OpenedMember(population(), m).avatar); });
 }
 
-void MemberSet::frame_studio() {
+void MemberSet::frame_shots() {
   std::vector<std::vector<Extent>> extents(population().size());
   crew.run("framing", population().size(),
-           [&](size_t m) { extents[m] = studio.look(OpenedMember(population(), m).avatar); });
-  for (size_t shot = 0; shot < studio.shots().size(); ++shot) {
+           [&](size_t m) { extents[m] = renderer.look(OpenedMember(population(), m).avatar); });
+  for (size_t shot = 0; shot < renderer.shots().size(); ++shot) {
     Extent all;
     for (const std::vector<Extent>& own : extents) all.add(own[shot]);
     if (!(all.right > all.left && all.bottom > all.top))
       throw InputError("population '" + population().name + "': its members cannot be seen");
     if (shot < kComparedShots) {
-      studio.frame(shot, all, picture_px, picture_px, kPictureMargin);
+      renderer.frame(shot, all, picture_px, picture_px, kPictureMargin);
     } else {
       portrait_extent_.add(all);
     }
@@ -129,7 +129,7 @@ Picture MemberSet::portrait(const Avatar& avatar, size_t shot, uint32_t height_p
   const auto finer = std::max(
       1u, static_cast<uint32_t>(std::lround(3.2 * population().network.input_size / height_px)));
   const auto width_px = static_cast<uint32_t>(std::lround(aspect * static_cast<float>(height_px)));
-  Studio framed = studio;
+  ShotRenderer framed = renderer;
   framed.frame(shot, portrait_extent_, finer * width_px, finer * height_px, kPortraitMargin);
   return shrink(framed.draw(avatar, shot, shot + 1).front(), finer);
 }

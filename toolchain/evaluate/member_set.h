@@ -32,7 +32,7 @@ struct MemberSet {
   const Population& population() const { return package->population(); }
   const std::string& name(size_t member) const { return population().members[member].name; }
   std::vector<Picture> draw(const Avatar& avatar) const {
-    return studio.draw(avatar, 0, kComparedShots);
+    return renderer.draw(avatar, 0, kComparedShots);
   }
   // One person to look at, a cell of `height_px`; all cells of a height are of one width and scale.
   Picture portrait(const Avatar& avatar, size_t shot, uint32_t height_px) const;
@@ -43,12 +43,12 @@ struct MemberSet {
   std::vector<size_t> training, held_out;  // members
   RowMatrix training_z, held_out_z;        // [N,D] and [H,D], standardised
   Standardisation standardisation;         // by the training members alone
-  Studio studio;
+  ShotRenderer renderer;
   uint32_t picture_px = 0;                     // side
   std::vector<std::vector<Picture>> pictures;  // [M] of kComparedShots
 
  private:
-  void frame_studio();
+  void frame_shots();
   Extent portrait_extent_;
 };
 

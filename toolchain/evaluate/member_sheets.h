@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "ports/linux/image.h"
+#include "ports/media/image.h"
 #include "toolchain/evaluate/member_set.h"
 #include "toolchain/evaluate/member_span.h"
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "toolchain/error.h"
-#include "toolchain/evaluate/posed_studio.h"
+#include "toolchain/evaluate/posed_members.h"
 #include "toolchain/train/random.h"
 
 namespace figurine::evaluate {
@@ -33,16 +33,16 @@ struct Sitting {
   size_t shots() const { return pictures[0].size(); }
 };
 
-Sitting draw_sitting(const PosedStudio& studio, const std::string& what,
+Sitting draw_sitting(const PosedMembers& posed, const std::string& what,
                      const std::vector<size_t>& members) {
   Sitting sitting;
   sitting.pictures.resize(members.size());
-  studio.draw(what, members, [&](size_t i, std::vector<Picture> pictures) {
+  posed.draw(what, members, [&](size_t i, std::vector<Picture> pictures) {
     sitting.pictures[i] = std::move(pictures);
   });
-  for (size_t a = 0; a < studio.shots(); ++a) {
-    for (size_t b = 0; b < studio.shots(); ++b) {
-      if (studio.pose_of(a) != studio.pose_of(b) && studio.view_of(a) != studio.view_of(b))
+  for (size_t a = 0; a < posed.shots(); ++a) {
+    for (size_t b = 0; b < posed.shots(); ++b) {
+      if (posed.pose_of(a) != posed.pose_of(b) && posed.view_of(a) != posed.view_of(b))
         sitting.shot_pairs.emplace_back(a, b);
     }
   }
@@ -264,7 +264,7 @@ nlohmann::json evaluate_networks(const Package& population, const Package& body,
                      " held-out members, at least 2 are needed");
   }
   nlohmann::json described = describe_networks(networks, population);
-  const PosedStudio studio(population, body,
+  const PosedMembers posed(population, body,
                            {.motion = options.motion,
                             .first_pose = options.first_pose,
                             .poses = options.poses,
@@ -273,17 +273,17 @@ nlohmann::json evaluate_networks(const Package& population, const Package& body,
                             .threads = options.threads,
                             .quiet = options.quiet});
   training.resize(std::min(training.size(), held_out.size()));
-  const Sitting strangers = draw_sitting(studio, "drawing held-out members", held_out);
+  const Sitting strangers = draw_sitting(posed, "drawing held-out members", held_out);
   nlohmann::json scales = nlohmann::json::object();
   for (const auto& network : networks.perceptual)
     scales[network->name()] = scale_of(*network, strangers, options);
   nlohmann::json report{
       {"networks", std::move(described)},
       {"pictures",
-       {{"poses", options.poses}, {"views", options.views}, {"size", studio.picture_px()}}},
+       {{"poses", options.poses}, {"views", options.views}, {"size", posed.picture_px()}}},
       {"held_out", measure(strangers, networks, options)},
       {"training",
-       measure(draw_sitting(studio, "drawing training members", training), networks, options)},
+       measure(draw_sitting(posed, "drawing training members", training), networks, options)},
       {"scale", std::move(scales)}};
   return report;
 }

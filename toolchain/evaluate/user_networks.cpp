@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <map>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/npz.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/perceptual_embedding.h"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/train/flat_tensor.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"

@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "figurine/noise_level.h"
-#include "ports/linux/folder_lock.h"
+#include "ports/host/folder_lock.h"
 #include "toolchain/error.h"
 #include "toolchain/generate/autoencoder.h"
 #include "toolchain/generate/flat_trainer.h"

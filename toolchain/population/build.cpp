@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/writer/package_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/clip.h"
 #include "toolchain/body/makehuman_model.h"
 #include "toolchain/body/mannequin.h"

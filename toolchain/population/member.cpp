@@ -8,7 +8,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "formats/writer/population_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
@@ -113,7 +113,7 @@ void capture_identity(const Workshop& workshop, const Identity& identity,
                                   .first_identity = identity.number,
                                   .identities = 1,
                                   .frames = workshop.recipe.frames,
-                                  .rig = workshop.recipe.rig,
+                                  .cameras = workshop.recipe.cameras,
                                   .resume = true,
                                   .threads = 1,
                                   .limits = identity.group->limits,

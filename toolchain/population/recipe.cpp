@@ -135,8 +135,8 @@ train::TrainSettings read_training(const JsonField& json, const std::string& pre
 void read_capture(const JsonField& json, Recipe& recipe) {
   allow_only(json, {"frames", "views", "size_px"});
   recipe.frames = count(json["frames"], 4, 100000);
-  recipe.rig.views = count(json["views"], 2, 256);
-  recipe.rig.width_px = recipe.rig.height_px = count(json["size_px"], 16, 8192);
+  recipe.cameras.views = count(json["views"], 2, 256);
+  recipe.cameras.width_px = recipe.cameras.height_px = count(json["size_px"], 16, 8192);
 }
 
 // Names that only the test part may wear are never chosen elsewhere, and nobody is in two groups.

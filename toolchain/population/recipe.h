@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "formats/writer/population_writer.h"
-#include "toolchain/capture/rig.h"
+#include "toolchain/capture/camera_rings.h"
 #include "toolchain/capture/wardrobe.h"
 #include "toolchain/train/settings.h"
 
@@ -48,7 +48,7 @@ struct Recipe {
   uint64_t seed = 1;       // of the people; identity k depends on (seed, k) alone
   std::vector<MotionPiece> motions;
   uint32_t frames = 0;  // of a capture
-  capture::RigOptions rig;
+  capture::CameraRingsOptions cameras;
   std::vector<IdentityGroup> groups;
   InitialWeightsRecipe initial;
   train::TrainSettings

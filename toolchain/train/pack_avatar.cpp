@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "formats/writer/package_writer.h"
-#include "ports/linux/png.h"
+#include "ports/media/png.h"
 #include "toolchain/error.h"
 #include "toolchain/train/avatar_model.h"
 

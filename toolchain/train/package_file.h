@@ -4,7 +4,7 @@
 #include <string>
 
 #include "figurine/package.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 
 namespace figurine::train {
 

@@ -12,7 +12,7 @@
 #include <sstream>
 #include <thread>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/error.h"
 #include "toolchain/model/optimiser.h"
 #include "toolchain/model/unet.h"

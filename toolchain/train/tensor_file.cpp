@@ -5,7 +5,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/error.h"
 
 namespace figurine::train {

@@ -9,7 +9,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "gtest/gtest.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/motion_loop.h"
 #include "toolchain/body/posed_joints.h"

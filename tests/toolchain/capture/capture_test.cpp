@@ -10,7 +10,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "gtest/gtest.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/texel_body.h"
 #include "toolchain/dataset/dataset.h"
@@ -74,7 +74,7 @@ CaptureRequest small_request(const std::string& output) {
   return {.output = output,
           .seed = 5,
           .frames = 15,
-          .rig = {.views = 6, .width_px = 96, .height_px = 80},
+          .cameras = {.views = 6, .width_px = 96, .height_px = 80},
           .tool = "test",
           .sources = {"swinging: made by the test"}};
 }

@@ -7,7 +7,7 @@
 
 #include "formats/writer/population_writer.h"
 #include "gtest/gtest.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "samples/program.h"
 
 namespace figurine::cli {

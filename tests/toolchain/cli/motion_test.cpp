@@ -5,7 +5,7 @@
 #include "figurine/package.h"
 #include "formats/writer/package_writer.h"
 #include "gtest/gtest.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "samples/program.h"
 #include "toolchain/body/glb_builder.h"
 #include "toolchain/body/mannequin.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gtest/gtest.h"
-#include "ports/linux/png.h"
+#include "ports/media/png.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
 

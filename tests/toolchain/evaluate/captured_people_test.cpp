@@ -89,8 +89,8 @@ std::vector<std::array<int, 2>> project_body(const MemberSet& set, size_t member
   std::vector<float> joints(size_t{body.joint_count()} * 3), texels(size_t{body.texel_count()} * 3);
   shape_body(body, opened.avatar.shape, joints, texels);
   std::vector<Affine> transforms(body.joint_count());
-  skinning_transforms({body.parents, joints}, set.studio.pose(shot), transforms);
-  const Camera& camera = set.studio.camera(shot);
+  skinning_transforms({body.parents, joints}, set.renderer.pose(shot), transforms);
+  const Camera& camera = set.renderer.camera(shot);
   std::vector<std::array<int, 2>> pixels;
   for (size_t t = 0; t < body.texel_count(); ++t) {
     const Affine world_from_rest = blend(transforms, &body.texel_joints[t * kSkinInfluences],

@@ -56,14 +56,14 @@ TEST(ComparedPictures, EqualThePlainComparison) {
   }
 }
 
-TEST(Studio, FramesWhatItLookedAt) {
+TEST(ShotRenderer, FramesWhatItLookedAt) {
   const tests::SyntheticBody body = make_test_body();
   const tests::SyntheticAvatar avatar = make_test_avatar(body);
   const tests::SyntheticPose pose = tests::make_test_pose(body.body(), 1);
-  Studio studio(*body.package, {{pose.root_translation_m, pose.rotations}},
-                {{.pose = 0, .azimuth_deg = 20, .grounded = true}});
-  studio.frame(0, studio.look(avatar.package->avatar())[0], 60, 90, 0.2f);
-  const std::vector<Picture> pictures = studio.draw(avatar.package->avatar(), 0, 1);
+  ShotRenderer renderer(*body.package, {{pose.root_translation_m, pose.rotations}},
+                        {{.pose = 0, .azimuth_deg = 20, .grounded = true}});
+  renderer.frame(0, renderer.look(avatar.package->avatar())[0], 60, 90, 0.2f);
+  const std::vector<Picture> pictures = renderer.draw(avatar.package->avatar(), 0, 1);
   ASSERT_EQ(pictures.size(), 1u);
   EXPECT_EQ(pictures[0].width_px, 60u);
   EXPECT_EQ(pictures[0].height_px, 90u);

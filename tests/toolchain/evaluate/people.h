@@ -9,7 +9,7 @@
 
 #include "formats/writer/population_writer.h"
 #include "gtest/gtest.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "runtime/test_packages.h"
 #include "toolchain/error.h"
 

@@ -10,7 +10,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "ports/linux/folder_lock.h"
+#include "ports/host/folder_lock.h"
 #include "tests/toolchain/generate/small_people.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"

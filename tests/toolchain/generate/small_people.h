@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "formats/writer/population_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "runtime/test_packages.h"
 
 namespace figurine::tests {

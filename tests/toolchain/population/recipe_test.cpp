@@ -32,7 +32,7 @@ TEST(Recipe, SaysWhoIsMadeAndHow) {
   EXPECT_EQ(recipe.training.schedule.budget.iterations, 40u);
   EXPECT_EQ(recipe.training.views_per_pose, 2u);
   EXPECT_FALSE(recipe.training.bf16);
-  EXPECT_EQ(recipe.rig.width_px, 64u);
+  EXPECT_EQ(recipe.cameras.width_px, 64u);
   const std::vector<Identity> people = identities_of(recipe);
   ASSERT_EQ(people.size(), 4u);
   EXPECT_EQ(people[3].name(), "000010");

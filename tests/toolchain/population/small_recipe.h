@@ -6,7 +6,7 @@
 #include <string>
 
 #include "formats/writer/package_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/motion_clip.h"
 #include "toolchain/body/skeleton.h"
 #include "toolchain/error.h"

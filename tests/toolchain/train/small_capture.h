@@ -10,7 +10,7 @@
 #include <string>
 
 #include "formats/writer/package_writer.h"
-#include "ports/linux/files.h"
+#include "ports/host/files.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/skeleton.h"
 #include "toolchain/body/texel_body.h"
@@ -50,7 +50,7 @@ struct SmallCapture {
     capture::capture_identities({.output = folder.path("capture"),
                                  .seed = 5,
                                  .frames = 32,
-                                 .rig = {.views = 8, .width_px = 128, .height_px = 128},
+                                 .cameras = {.views = 8, .width_px = 128, .height_px = 128},
                                  .threads = 2,
                                  .tool = "test",
                                  .sources = {"swinging: made by the test"}},

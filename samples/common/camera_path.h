@@ -1,0 +1,29 @@
+// A camera for every frame of a scene: as asked for, following the figures, or framing them.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "figurine/renderer.h"
+#include "samples/common/camera_spec.h"
+#include "samples/common/scene.h"
+
+namespace figurine::samples {
+
+struct CameraPathOptions {
+  CameraSpec camera;
+  std::optional<ImageSize>
+      size;            // without: the JSON camera's, else the golden frame's of the first avatar
+  bool follow = true;  // orbit cameras move with the figures' smoothed path; otherwise they see the
+                       // whole path from one place
+  std::optional<float> near_m;
+};
+
+// The scene must have been added to the renderer, which poses it in a few frames to see how large
+// it is. frames is not empty.
+Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
+                                             std::span<const uint32_t> frames, Scene& scene,
+                                             Renderer& renderer);
+
+}  // namespace figurine::samples

@@ -1,0 +1,69 @@
+#include "samples/common/frame_log.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace figurine::samples {
+
+namespace {
+
+constexpr double kNsPerMs = 1e6;
+
+// Microseconds are what a clock on a busy machine can honestly say.
+double rounded(double ms) { return std::round(ms * 1000) / 1000; }
+
+}  // namespace
+
+Summary summarise(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const size_t n = values.size();
+  const double median = n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+  const auto rank = static_cast<size_t>(std::ceil(0.9 * static_cast<double>(n)));
+  return {median, values[rank - 1]};
+}
+
+void FrameLog::add(const FrameStatistics& statistics, uint64_t total_ns) {
+  total_ms_.push_back(static_cast<double>(total_ns) / kNsPerMs);
+  for (size_t s = 0; s < kStageCount; ++s)
+    stage_ms_[s].push_back(static_cast<double>(statistics.stage_ns[s]) / kNsPerMs);
+  gaussians_.push_back(static_cast<double>(statistics.gaussians));
+  visible_.push_back(static_cast<double>(statistics.visible));
+  pairs_.push_back(static_cast<double>(statistics.pairs));
+  blends_.push_back(static_cast<double>(statistics.blends));
+  macs_.push_back(static_cast<double>(statistics.macs));
+}
+
+Summary FrameLog::stages_ms(std::span<const Stage> stages) const {
+  std::vector<double> sums(frames(), 0);
+  for (const Stage stage : stages) {
+    const std::vector<double>& values = stage_ms_[static_cast<size_t>(stage)];
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] += values[i];
+  }
+  return summarise(std::move(sums));
+}
+
+nlohmann::ordered_json FrameLog::stages_json() const {
+  const auto entry = [](const Summary& summary) {
+    return nlohmann::ordered_json{{"median", rounded(summary.median)},
+                                  {"p90", rounded(summary.p90)}};
+  };
+  nlohmann::ordered_json json = {{"total", entry(total_ms())}};
+  for (size_t s = 0; s < kStageCount; ++s)
+    json[to_string(static_cast<Stage>(s))] = entry(summarise(stage_ms_[s]));
+  return json;
+}
+
+nlohmann::ordered_json FrameLog::work_json() const {
+  const auto count = [](const std::vector<double>& values) {
+    return static_cast<uint64_t>(std::llround(summarise(values).median));
+  };
+  return {{"gaussians", count(gaussians_)},
+          {"visible", count(visible_)},
+          {"pairs", count(pairs_)},
+          {"blends", count(blends_)},
+          {"macs", count(macs_)}};
+}
+
+}  // namespace figurine::samples

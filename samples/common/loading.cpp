@@ -1,0 +1,199 @@
+#include "samples/common/loading.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+namespace figurine::samples {
+
+namespace {
+
+// The .fgn files of a folder in the order of their names, so that the same folder always gives the
+// same answer. None if it cannot be read.
+std::vector<std::string> packages_in(const std::string& folder) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".fgn" && entry->is_regular_file(error))
+      paths.push_back(entry->path().string());
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+// The folders beside a folder, itself not among them, that hold packages; in the order of their
+// names. None if the folder above cannot be read.
+std::vector<std::string> siblings_of(const std::filesystem::path& folder) {
+  std::vector<std::string> siblings;
+  std::error_code error;
+  const std::filesystem::path above = (folder / "..").lexically_normal();
+  for (std::filesystem::directory_iterator entry(above, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code unreadable;
+    if (!entry->is_directory(unreadable) ||
+        std::filesystem::equivalent(entry->path(), folder, unreadable))
+      continue;
+    if (!packages_in(entry->path().string()).empty()) siblings.push_back(entry->path().string());
+  }
+  std::sort(siblings.begin(), siblings.end());
+  return siblings;
+}
+
+// The package's own folder, then those of FIGURINE_PATH.
+std::vector<std::string> first_body_folders(const std::filesystem::path& own) {
+  std::vector<std::string> folders = {own.string()};
+  if (const char* search = std::getenv("FIGURINE_PATH"); search != nullptr) {
+    std::istringstream list(search);
+    for (std::string part; std::getline(list, part, ':');) {
+      if (!part.empty()) folders.push_back(part);
+    }
+  }
+  return folders;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path) {
+  Result<ports::MappedFile> file = ports::MappedFile::open(path);
+  if (!file.ok()) return file.status();
+  Result<Package> package = Package::open(file->bytes(), path);
+  if (!package.ok()) return package.status();
+  return std::make_unique<LoadedPackage>(
+      LoadedPackage{path, std::move(*file), std::move(*package)});
+}
+
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted) {
+  Result<std::unique_ptr<LoadedPackage>> loaded = load_package(path);
+  if (loaded.ok() && (*loaded)->package.kind() != wanted) {
+    return Status(StatusCode::kInvalidArgument, path + ": kind: is a package of kind " +
+                                                    to_string((*loaded)->package.kind()) +
+                                                    ", not " + to_string(wanted));
+  }
+  return loaded;
+}
+
+namespace {
+
+// "people.fgn#17" in its parts. A file of the whole name goes first: '#' is no unusual letter in a
+// path.
+std::pair<std::string, std::optional<std::string>> split_member(const std::string& name) {
+  const size_t hash = name.rfind('#');
+  std::error_code error;
+  if (hash == std::string::npos || std::filesystem::exists(name, error))
+    return {name, std::nullopt};
+  return {name.substr(0, hash), name.substr(hash + 1)};
+}
+
+Status open_population_member(const Population& population, const std::string& path,
+                              const std::optional<std::string>& member, LoadedAvatar& out) {
+  const std::string count = std::to_string(population.size()),
+                    last = std::to_string(population.size() - 1);
+  if (!member) {
+    return Status(StatusCode::kInvalidArgument, path + ": is a population: name one of its " +
+                                                    count + " members, " + path + "#NAME or " +
+                                                    path + "#0 to #" + last);
+  }
+  const std::optional<size_t> index = find_member(population, *member);
+  if (!index) {
+    return Status(StatusCode::kNotFound, path + ": member '" + *member +
+                                             "': there is none of this name, and its " + count +
+                                             " members have the numbers 0 to " + last +
+                                             " (figurine-inspect lists them)");
+  }
+  out.storage.resize(member_floats(population));
+  out.avatar = open_member(population, *index, out.storage);
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name) {
+  const auto [path, member] = split_member(name);
+  Result<std::unique_ptr<LoadedPackage>> package = load_package(path);
+  if (!package.ok()) return package.status();
+  auto loaded = std::make_unique<LoadedAvatar>(LoadedAvatar{name, std::move(*package), {}, {}});
+  const Package& opened = loaded->package->package;
+  if (opened.kind() == PackageKind::kPopulation) {
+    FIG_RETURN_IF_ERROR(open_population_member(opened.population(), path, member, *loaded));
+    return loaded;
+  }
+  if (member) {
+    return Status(StatusCode::kInvalidArgument,
+                  path + ": member '" + *member + "': a package of kind " +
+                      to_string(opened.kind()) + " has no members, a population has");
+  }
+  if (opened.kind() == PackageKind::kSampler) {
+    return Status(StatusCode::kInvalidArgument,
+                  path + ": kind: is a sampler: figurine sample makes an avatar of it");
+  }
+  if (opened.kind() != PackageKind::kAvatar) {
+    return Status(StatusCode::kInvalidArgument, path + ": kind: is a package of kind " +
+                                                    to_string(opened.kind()) + ", not avatar");
+  }
+  loaded->avatar = opened.avatar();
+  return loaded;
+}
+
+Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar,
+                                                 const std::string& body_option) {
+  return find_body(avatar.avatar, avatar.name, avatar.package->path, body_option);
+}
+
+namespace {
+
+// A search for one body, and what it has met: for the message if it fails.
+struct BodySearch {
+  const Avatar& wanted;
+  std::string looked_in, others;
+
+  // Null if the body is not among the folder's packages.
+  std::unique_ptr<LoadedPackage> look_in(const std::string& folder) {
+    looked_in += (looked_in.empty() ? "" : ", ") + folder;
+    for (const std::string& path : packages_in(folder)) {
+      Result<std::unique_ptr<LoadedPackage>> candidate = load_package(path);
+      if (!candidate.ok() || (*candidate)->package.kind() != PackageKind::kBody) continue;
+      if ((*candidate)->package.content_hash() == wanted.body_hash) return std::move(*candidate);
+      others += (others.empty() ? "" : ", ") + path + " is " +
+                format_hash((*candidate)->package.content_hash());
+    }
+    return nullptr;
+  }
+};
+
+}  // namespace
+
+Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& wanted, const std::string& name,
+                                                 const std::string& beside,
+                                                 const std::string& body_option) {
+  const auto checked = [&](std::unique_ptr<LoadedPackage> body) {
+    const Status fits = check_avatar_fits_body(wanted, body->package);
+    return fits.ok() ? Result(std::move(body)) : fits.within(name + " on " + body->path);
+  };
+  if (!body_option.empty()) {
+    Result<std::unique_ptr<LoadedPackage>> body = load_package(body_option, PackageKind::kBody);
+    return body.ok() ? checked(std::move(*body)) : std::move(body);
+  }
+  std::filesystem::path own = std::filesystem::path(beside).parent_path();
+  if (own.empty()) own = ".";
+  BodySearch search{wanted, {}, {}};
+  for (const std::string& folder : first_body_folders(own)) {
+    if (std::unique_ptr<LoadedPackage> body = search.look_in(folder))
+      return checked(std::move(body));
+  }
+  for (const std::string& folder : siblings_of(own)) {
+    if (std::unique_ptr<LoadedPackage> body = search.look_in(folder))
+      return checked(std::move(body));
+  }
+  const bool none = search.others.empty();
+  return Status(none ? StatusCode::kNotFound : StatusCode::kMismatch,
+                name + ": body: needs " + format_hash(wanted.body_hash) + " (" + wanted.body_name +
+                    "); looked in " + search.looked_in +
+                    (none ? "; no body there" : "; found others: " + search.others));
+}
+
+}  // namespace figurine::samples

@@ -1,0 +1,54 @@
+// Packages from files: opened by memory map, checked for their kind, avatars also out of
+// populations, bodies found for avatars.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "figurine/package.h"
+#include "figurine/status.h"
+#include "ports/host/files.h"
+
+namespace figurine::samples {
+
+// A package and the map its views point into.
+struct LoadedPackage {
+  std::string path;
+  ports::MappedFile file;
+  Package package;
+};
+
+// kNotFound, kCorrupt... as the file and the reader say; kInvalidArgument names both kinds if it is
+// another one than wanted.
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted);
+
+// Of any kind.
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path);
+
+// An avatar from a package of its own, or a member of a population.
+struct LoadedAvatar {
+  std::string name;                        // as it was asked for: "person.fgn", "people.fgn#17"
+  std::unique_ptr<LoadedPackage> package;  // that it came from
+  std::vector<float> storage;              // of a member's weights
+  Avatar avatar;                           // points into both
+};
+
+// "PATH" of an avatar, or "PATH#MEMBER" of a population, MEMBER a name or a number counted from 0.
+// One line says so if the package is of the other kind or has no such member.
+Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name);
+
+// The body that an avatar was made for: body_option if given (it must be the right one), else the
+// .fgn files beside the avatar, else those of the folders in FIGURINE_PATH (colon-separated), else
+// those of the folders beside the avatar's own (samplers/x.fgn stands on populations/y.fgn). Found
+// by content hash, whatever the file is called. Errors name the hash that is wanted and the hashes
+// that were found.
+Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar,
+                                                 const std::string& body_option);
+// The same of an avatar that is no file yet: name is what messages call it, beside the path of what
+// it was made from.
+Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& avatar, const std::string& name,
+                                                 const std::string& beside,
+                                                 const std::string& body_option);
+
+}  // namespace figurine::samples

@@ -1,0 +1,88 @@
+// The figures of a picture: avatars with their bodies, their poses and places, and what all of them
+// do at a moment.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "figurine/renderer.h"
+#include "samples/common/loading.h"
+#include "samples/common/parse.h"
+#include "samples/common/pose_source.h"
+
+namespace figurine::samples {
+
+struct SceneOptions {
+  std::vector<std::string> avatars;
+  std::string body;                  // empty: found by content hash
+  std::vector<std::string> motions;  // none: the golden pose; one for all, or one for each avatar
+  float spacing_m = 0.9f;            // between neighbours side by side, where no places are given
+  std::vector<std::string> places;   // "X,Z[,HEADING]" for each avatar, or none
+};
+
+class Scene {
+ public:
+  // Loads and checks everything; nothing later can fail on data.
+  static Result<Scene> load(const SceneOptions& options);
+
+  size_t size() const { return figures_.size(); }
+  bool moves() const { return frame_count_ > 1; }
+  uint32_t frame_count() const { return frame_count_; }  // of the shortest motion; 1 without
+  float frames_per_second() const { return frames_per_second_; }
+  const LoadedAvatar& avatar(size_t figure) const { return *figures_[figure].avatar; }
+  const LoadedPackage& body(size_t figure) const { return *figures_[figure].body; }
+  // The frames of the range that exist. kInvalidArgument if it reaches beyond the motion.
+  Result<std::vector<uint32_t>> frames(const FrameRange& range) const;
+
+  // Adds every avatar, in the precision asked for or the best that it holds. Identities are kept in
+  // order, one renderer at a time.
+  Status add_to(Renderer& renderer, std::optional<Precision> precision);
+  // What the avatars run in: "f32", "q8", or "mixed".
+  std::string precision(const Renderer& renderer) const;
+  // Whether every avatar holds it.
+  bool holds(Precision precision) const;
+
+  // Everybody's pose, at their places, in three ways; each valid until the next call of any, and
+  // none allocates. In a frame of the motions, each by its own rate:
+  std::span<const FrameAvatar> pose(uint32_t frame);
+  // At a made-up moment of a scene without motion: swaying about the pose of frame 0.
+  std::span<const FrameAvatar> sway(uint32_t moment);
+  // At a time, from the figures' sources. Error: a source has ended.
+  Result<std::span<const FrameAvatar>> pose_at(double time_s);
+  // A figure's source for pose_at(); at first its motion, or its golden pose.
+  void set_source(size_t figure, std::unique_ptr<PoseSource> source);
+
+  // World position of a figure's root joint in the last pose.
+  std::array<float, 3> root_m(size_t figure) const;
+  // Where a figure looks in the last pose, in degrees about the vertical: 0 is +z, positive towards
+  // +x.
+  float heading_deg(size_t figure) const;
+
+ private:
+  struct Figure {
+    std::shared_ptr<LoadedAvatar> avatar;
+    std::shared_ptr<LoadedPackage> body, motion;
+    Placement place;
+    std::array<float, 3> rest_root_m{0, 0, 0};  // of the template that the Gaussians sit on
+    std::unique_ptr<PoseSource> source, swaying;
+    std::vector<float> rotations;  // [J,4] of the last pose
+    std::array<float, 3> root_translation_m{0, 0, 0};
+
+    // Without motion the golden pose, whatever the frame.
+    PoseView recorded_pose(uint32_t frame) const;
+  };
+  static Result<Figure> load_figure(const SceneOptions& options, size_t index,
+                                    std::span<const Figure> others);
+  void place_figure(size_t figure, const PoseView& pose);
+
+  std::vector<Figure> figures_;
+  std::vector<FrameAvatar> posed_;
+  uint32_t frame_count_ = 1;
+  float frames_per_second_ = 30;
+};
+
+}  // namespace figurine::samples
