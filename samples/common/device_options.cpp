@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "ports/host/clock.h"
@@ -10,13 +11,27 @@
 
 namespace figurine::samples {
 
+namespace {
+
+// Those of this build and this CPU, the largest last.
+std::string isa_names() {
+  std::string names;
+  for (const Isa isa : supported_isas())
+    names += (names.empty() ? "" : ", ") + std::string(to_string(isa));
+  return names;
+}
+
+}  // namespace
+
 void DeviceOptions::add_to(CLI::App& app, bool json_flag) {
   app.add_option("--threads", threads, "CPU threads; default: as many as there are CPUs, at most 8")
       ->check(CLI::Range(1u, 64u));
   app.add_option(
       "--precision", precision,
       "arithmetic of the network: f32, or q8 (fixed point); default: q8 where the package has it");
-  app.add_option("--isa", isa, "kernels of the splatter: scalar")->capture_default_str();
+  app.add_option("--isa", isa,
+                 "instruction set of figurine's own kernels, the same pixels with each: " +
+                     isa_names() + "; default: FIGURINE_ISA, else the last");
   if (json_flag) app.add_flag("--json", json, "print a summary as JSON to standard output");
 }
 
@@ -25,11 +40,26 @@ Result<RendererOptions> DeviceOptions::renderer_options() const {
     return Status(StatusCode::kUnsupported,
                   "precision '" + precision + "' is unsupported in this build; it has f32 and q8");
   }
-  if (isa != "scalar")
-    return Status(StatusCode::kUnsupported,
-                  "isa '" + isa + "' is unsupported in this build; it has scalar");
+  const Result<Isa> kernels = instruction_set();
+  if (!kernels.ok()) return kernels.status();
   return RendererOptions{.threads = threads != 0 ? threads : std::min(usable_cpus(), 8u),
-                         .now_ns = ports::now_ns};
+                         .now_ns = ports::now_ns,
+                         .isa = *kernels};
+}
+
+Result<Isa> DeviceOptions::instruction_set() const {
+  const char* const environment = std::getenv("FIGURINE_ISA");
+  const std::string name = !isa.empty() ? isa : (environment != nullptr ? environment : "");
+  if (name.empty()) return supported_isas().back();
+  const std::string where = isa.empty() ? "FIGURINE_ISA: " : "";
+  const std::optional<Isa> known = isa_from_string(name);
+  const std::span<const Isa> supported = supported_isas();
+  if (known && std::find(supported.begin(), supported.end(), *known) != supported.end()) {
+    return *known;
+  }
+  return Status(StatusCode::kUnsupported,
+                where + "isa '" + name +
+                    "' is unsupported in this build or by this CPU; there is " + isa_names());
 }
 
 std::optional<Precision> DeviceOptions::network_precision() const {
@@ -45,11 +75,12 @@ nlohmann::ordered_json json_header(const char* command) {
 
 nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threads,
                                     const std::string& precision) {
+  const Result<Isa> isa = options.instruction_set();  // renderer_options() has looked at it
   return {{"cpu", cpu_name()},
           {"cpus", usable_cpus()},
           {"threads", threads},
           {"precision", precision},
-          {"isa", options.isa}};
+          {"isa", isa.ok() ? to_string(*isa) : "none"}};
 }
 
 void print_json(const nlohmann::ordered_json& json) {

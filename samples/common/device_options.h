@@ -17,7 +17,7 @@ namespace figurine::samples {
 
 struct DeviceOptions {
   std::string precision;  // empty: the best that an avatar holds
-  std::string isa = "scalar";
+  std::string isa;        // empty: FIGURINE_ISA of the environment; without it, the largest there is
   uint32_t threads = 0;  // 0: as many as there are CPUs, 8 at most
   bool json = false;
 
@@ -27,6 +27,8 @@ struct DeviceOptions {
   Result<RendererOptions> renderer_options() const;
   // As asked for; without, the renderer's own choice. renderer_options() has looked at it.
   std::optional<Precision> network_precision() const;
+  // Of our own kernels: the same pixels with every one. kUnsupported for what is not there.
+  Result<Isa> instruction_set() const;
 };
 
 // "command" and "version", the first fields of every --json output (docs/json.md).

@@ -233,7 +233,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
                      {"cpus", usable_cpus()},
                      {"threads", 1},
                      {"precision", "q8"},
-                     {"isa", "scalar"}};
+                     {"isa", to_string(supported_isas().back())}};
   json["sampler"] = package.path;
   json["seeds"] = options.seeds;
   json["size"] = {people.golden().camera.width_px, people.golden().camera.height_px};

@@ -157,6 +157,21 @@ TEST_F(Cli, ThreadsDoNotChangePixels) {
   EXPECT_EQ(folder_.read("a.pfm"), folder_.read("b.pfm"));
 }
 
+TEST_F(Cli, AnInstructionSetIsNamedByOptionOrEnvironment) {
+  const ProgramRun named = run("render P/avatar.fgn --isa baseline --json -o a.png");
+  ASSERT_EQ(named.exit_code, 0) << named.err;
+  EXPECT_NE(named.out.find("\"isa\": \"baseline\""), std::string::npos) << named.out;
+  ASSERT_EQ(run("render P/avatar.fgn -o b.png").exit_code, 0);
+  EXPECT_EQ(folder_.read("a.png"), folder_.read("b.png")) << "the same pixels with each";
+  ASSERT_EQ(
+      run("render P/avatar.fgn -o c.png", {.environment = "FIGURINE_ISA=baseline "}).exit_code, 0);
+  const ProgramRun refused =
+      run("render P/avatar.fgn -o d.png", {.environment = "FIGURINE_ISA=mmx "});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("FIGURINE_ISA: isa 'mmx'"), std::string::npos) << refused.err;
+  EXPECT_FALSE(folder_.has("d.png"));
+}
+
 TEST_F(Cli, PngIsTheRoundedPfm) {
   ASSERT_EQ(run("render P/avatar.fgn --size 64x64 -o x.pfm").exit_code, 0);
   ASSERT_EQ(run("render P/avatar.fgn --size 64x64 -o x.png").exit_code, 0);
@@ -590,7 +605,7 @@ TEST_F(Cli, BadInputGetsOneLineAndNoFile) {
   expect_refused("bench P/fixed.fgn --precision f32", 1, "in q8 alone, not in f32");
   expect_refused("selftest P/fixed.fgn --precision f32", 1, "nothing to compare with");
   expect_refused("render P/avatar.fgn --precision f16 -o x.png", 1, "unsupported in this build");
-  expect_refused("render P/avatar.fgn --isa avx2 -o x.png", 1, "unsupported in this build");
+  expect_refused("render P/avatar.fgn --isa mmx -o x.png", 1, "unsupported in this build");
   expect_refused("render P/avatar.fgn P/avatar.fgn --place 0,0 -o x.png", 1, "place");
   expect_refused("splat P/missing.ply -o x.png", 1, "missing.ply");
   expect_refused("splat P/avatar.fgn -o x.png", 1, "does not start with 'ply'");
