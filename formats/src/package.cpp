@@ -1,5 +1,7 @@
 #include "figurine/package.h"
 
+#include <algorithm>
+
 #include <cmath>
 #include <variant>
 
@@ -80,14 +82,34 @@ Package::~Package() = default;
 
 namespace {
 
-// The header promises what the content holds, so that a reader of the header alone can tell.
-// avatar: null for other kinds.
-Status check_features(const layout::Header& header, const Avatar* avatar) {
-  const bool promised = (header.required_features & kFeatureFixedPoint) != 0;
-  const bool held = avatar != nullptr && avatar->holds(Precision::kFixedPoint);
+using Content = std::variant<Body, Avatar, Motion, PopulationContent, Sampler>;
+
+bool has_bounded_offsets(const Content& content) {
+  const auto bounded = [](const HeadDecoding& decoding) { return decoding.max_offset != 0; };
+  if (const Avatar* avatar = std::get_if<Avatar>(&content)) return bounded(avatar->decoding);
+  if (const Sampler* sampler = std::get_if<Sampler>(&content)) return bounded(sampler->decoding);
+  const PopulationContent* of_many = std::get_if<PopulationContent>(&content);
+  return of_many != nullptr &&
+         std::any_of(of_many->population.members.begin(), of_many->population.members.end(),
+                     [&](const PopulationMember& member) { return bounded(member.decoding); });
+}
+
+Status check_feature(const layout::Header& header, uint64_t feature, bool held, const char* bit,
+                     const char* thing) {
+  const bool promised = (header.required_features & feature) != 0;
   if (promised == held) return {};
-  return corrupt("header.required_features", "the bit of fixed point is ", promised ? "" : "not ",
-                 "set, such a network is ", held ? "" : "not ", "there");
+  return corrupt("header.required_features", "the bit of ", bit, " is ", promised ? "" : "not ",
+                 "set, such ", thing, held ? "" : "not ", "there");
+}
+
+// The header promises what the content holds, so that a reader of the header alone can tell.
+Status check_features(const layout::Header& header, const Content& content) {
+  const Avatar* avatar = std::get_if<Avatar>(&content);
+  FIG_RETURN_IF_ERROR(check_feature(header, kFeatureFixedPoint,
+                                    avatar != nullptr && avatar->holds(Precision::kFixedPoint),
+                                    "fixed point", "a network is "));
+  return check_feature(header, kFeatureBoundedOffsets, has_bounded_offsets(content),
+                       "bounded offsets", "a decoding is ");
 }
 
 }  // namespace
@@ -127,7 +149,7 @@ Result<Package> Package::open(std::span<const std::byte> bytes, const std::strin
             read_sampler(index, blobs, contents->budget, contents->content.emplace<Sampler>()));
         break;
     }
-    FIG_RETURN_IF_ERROR(check_features(contents->header, std::get_if<Avatar>(&contents->content)));
+    FIG_RETURN_IF_ERROR(check_features(contents->header, contents->content));
     return blobs.check_all_known();
   };
   if (const Status status = read(); !status.ok()) return status.within(name);

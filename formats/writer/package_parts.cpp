@@ -131,6 +131,7 @@ Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget,
     }
     add_fixed_point(avatar, *shapes, list);
   }
+  if (avatar.decoding.max_offset != 0) parts.required_features |= kFeatureBoundedOffsets;
   add_pose_statistics(avatar.pose_statistics, list);
   list.add("golden.rotations", avatar.golden.rotations, {4});
   list.add("golden.png", avatar.golden.png);
@@ -169,6 +170,9 @@ Result<PackageParts> take_apart(const Population& population, const Budget& budg
     weights += static_cast<uint32_t>(layer.weights.size());
     rows += static_cast<uint32_t>(layer.bias.size());
     convolutions += layer.op == LayerOp::kConv2d;
+  }
+  for (const PopulationMember& member : p.members) {
+    if (member.decoding.max_offset != 0) parts.required_features |= kFeatureBoundedOffsets;
   }
   PartList list(parts.blobs);
   add_float_weights("initial", p.network, *shapes, list);
@@ -224,6 +228,7 @@ Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget,
     rows += matrix.rows;
     matrix_bytes += size_t{matrix.rows} * matrix.columns;
   }
+  if (sampler.decoding.max_offset != 0) parts.required_features |= kFeatureBoundedOffsets;
   const uint32_t d = sampler.denoiser.d_model;
   PartList list(parts.blobs);
   list.add("space.mean", sampler.mean, {}, values);

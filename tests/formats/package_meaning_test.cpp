@@ -167,6 +167,13 @@ TEST(PackageAvatar, RejectsWeightsThatAreNotFinite) {
   }
 }
 
+TEST(PackageAvatar, RejectsBoundsOfOffsetsThatAreNone) {
+  for (float value : {-1.0f, kNan, kInfinity, 1001.0f}) {
+    expect_refused(bent_avatar([&](AvatarSample& s) { s.avatar.decoding.max_offset = value; }),
+                   "avatar.decoding.max_offset");
+  }
+}
+
 TEST(PackageAvatar, RejectsNetworksThatDoNotFitTheHeadOrTheMaps) {
   expect_refused(bent_avatar([](AvatarSample& s) { s.avatar.decoding.sh_degree = 0; }),
                  "the head needs 14");
@@ -291,6 +298,13 @@ TEST(PackageAvatar, TheHeaderAndTheGoldenHashAgreeWithTheNetwork) {
                  "the bit of fixed point is set, such a network is not there");
   expect_refused(with(fixed, [](PackageParts& parts, Avatar&) { parts.required_features = 0; }),
                  "the bit of fixed point is not set, such a network is there");
+  AvatarSample bounded;
+  bounded.avatar.decoding.max_offset = 1.5f;
+  expect_refused(with(floats, [](PackageParts& parts,
+                                 Avatar&) { parts.required_features = kFeatureBoundedOffsets; }),
+                 "the bit of bounded offsets is set, such a decoding is not there");
+  expect_refused(with(bounded, [](PackageParts& parts, Avatar&) { parts.required_features = 0; }),
+                 "the bit of bounded offsets is not set, such a decoding is there");
   expect_refused(
       with(hashed, [](PackageParts&, Avatar& avatar) { avatar.golden.fixed_point_hash[1] = 1; }),
       "golden.fixed_point_hash");

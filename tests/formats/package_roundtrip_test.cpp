@@ -88,6 +88,7 @@ TEST(PackageRoundTrip, AvatarKeepsEveryField) {
   EXPECT_EQ(in.decoding.max_log_scale, out.decoding.max_log_scale);
   EXPECT_EQ(in.decoding.opacity_bias, out.decoding.opacity_bias);
   EXPECT_EQ(in.decoding.sh_degree, out.decoding.sh_degree);
+  EXPECT_EQ(in.decoding.max_offset, out.decoding.max_offset);
   EXPECT_EQ(in.network.input_size, out.network.input_size);
   EXPECT_EQ(in.network.input_channels, out.network.input_channels);
   ASSERT_EQ(in.network.layers.size(), out.network.layers.size());

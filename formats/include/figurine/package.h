@@ -30,8 +30,10 @@ inline constexpr size_t kPackageHeaderBytes = 64;
 inline constexpr size_t kBlobAlignment = 64;
 
 // Bits of the header's required features.
-inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1}
-                                               << 0;  // an avatar's network is there in fixed point
+// An avatar's network is there in fixed point.
+inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1} << 0;
+// A head's offsets have a bound (HeadDecoding::max_offset): who ignored it would draw other pixels.
+inline constexpr uint64_t kFeatureBoundedOffsets = uint64_t{1} << 1;
 
 enum class PackageKind : uint8_t {
   kBody = 1,
