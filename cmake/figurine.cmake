@@ -18,16 +18,19 @@ if(FIGURINE_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER "${FIGURINE_CCACHE}")
 endif()
 
-# One arithmetic on every CPU: no fused multiply-add behind the code's back (docs/numerics.md, "Same pixels").
+# One arithmetic on every CPU: no fused multiply-add behind the code's back (docs/numerics.md, "Same
+# pixels").
 add_compile_options(-ffp-contract=off -Wall -Wextra -Wshadow -Wno-missing-field-initializers)
 if(FIGURINE_SANITIZE)
   # -O1: half the build time, better stacks, and the checks are the same.
-  add_compile_options(-O1 -fsanitize=${FIGURINE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  add_compile_options(-O1 -fsanitize=${FIGURINE_SANITIZE} -fno-sanitize-recover=all
+    -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${FIGURINE_SANITIZE})
 endif()
 
-# figurine_guard(TARGET...): what runs on devices says every conversion that may lose a value, and has no
-# warning. Errors only where we build it ourselves: another compiler's new warning is not a user's problem.
+# figurine_guard(TARGET...): what runs on devices says every conversion that may lose a value, and
+# has no warning. Errors only where we build it ourselves: another compiler's new warning is not a
+# user's problem.
 function(figurine_guard)
   foreach(target ${ARGN})
     target_compile_options(${target} PRIVATE -Wconversion)
@@ -35,7 +38,8 @@ function(figurine_guard)
   endforeach()
 endfunction()
 
-# figurine_program(VARIABLE TARGET): what a test calls to run the built program: its path or, in a cross build, that of a script with the emulator in front.
+# figurine_program(VARIABLE TARGET): what a test calls to run the built program: its path or, in a
+# cross build, that of a script with the emulator in front.
 function(figurine_program variable target)
   if(NOT CMAKE_CROSSCOMPILING)
     set(${variable} "$<TARGET_FILE:${target}>" PARENT_SCOPE)
@@ -43,26 +47,31 @@ function(figurine_program variable target)
   endif()
   set(script "${CMAKE_CURRENT_BINARY_DIR}/emulated-${target}")
   list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
-  file(GENERATE OUTPUT "${script}" CONTENT "#!/bin/sh\nexec ${emulator} '$<TARGET_FILE:${target}>' \"$@\"\n"
+  file(GENERATE OUTPUT "${script}"
+    CONTENT "#!/bin/sh\nexec ${emulator} '$<TARGET_FILE:${target}>' \"$@\"\n"
     FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE)
   set(${variable} "${script}" PARENT_SCOPE)
 endfunction()
 
-# figurine_test(NAME SOURCES... LIBRARIES...): a GoogleTest program, one ctest entry. Running no test is a failure. NOT_EMULATED names the tests (SUITE.NAME)
-# that a cross build leaves out, with the reason beside them.
+# figurine_test(NAME SOURCES... LIBRARIES...): a GoogleTest program, one ctest entry. Running no
+# test is a failure. NOT_EMULATED names the tests (SUITE.NAME) that a cross build leaves out, with
+# the reason beside them.
 function(figurine_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LIBRARIES;DEFINITIONS;LABELS;NOT_EMULATED" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LIBRARIES;DEFINITIONS;LABELS;NOT_EMULATED"
+    ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest GTest::gtest_main)
   target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}" "${PROJECT_SOURCE_DIR}/tests")
-  target_compile_definitions(${name} PRIVATE FIGURINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" ${arg_DEFINITIONS})
+  target_compile_definitions(${name} PRIVATE FIGURINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+    ${arg_DEFINITIONS})
   set(filter)
   if(CMAKE_CROSSCOMPILING AND arg_NOT_EMULATED)
     list(JOIN arg_NOT_EMULATED ":" names)
     set(filter "--gtest_filter=-${names}")
   endif()
   add_test(NAME ${name} COMMAND ${name} ${filter})
-  set_tests_properties(${name} PROPERTIES FAIL_REGULAR_EXPRESSION "Running 0 tests" LABELS "${arg_LABELS}")
+  set_tests_properties(${name} PROPERTIES FAIL_REGULAR_EXPRESSION "Running 0 tests"
+    LABELS "${arg_LABELS}")
   if(arg_TIMEOUT)
     set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT})
   endif()

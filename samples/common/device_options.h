@@ -17,8 +17,8 @@ namespace figurine::samples {
 
 struct DeviceOptions {
   std::string precision;  // empty: the best that an avatar holds
-  std::string isa;        // empty: FIGURINE_ISA of the environment; without it, the largest there is
-  uint32_t threads = 0;  // 0: as many as there are CPUs, 8 at most
+  std::string isa;        // empty: FIGURINE_ISA of the environment, else the largest there is
+  uint32_t threads = 0;   // 0: as many as there are CPUs, 8 at most
   bool json = false;
 
   // json_flag: whether the command has the plain --json; bench has one of its own.
