@@ -10,6 +10,7 @@
 #include "runtime/src/kernels/table.h"
 #include "runtime/src/pose/posed_avatar.h"
 #include "runtime/src/splat/gaussian_blocks.h"
+#include "runtime/src/splat/pixel_layout.h"
 #include "runtime/src/splat/rasterizer.h"
 #include "runtime/src/splat/view.h"
 
@@ -19,23 +20,6 @@ namespace {
 constexpr uint64_t kMaxGaussians = uint64_t(1) << 28;
 
 Status invalid(const std::string& what) { return Status(StatusCode::kInvalidArgument, what); }
-
-Status validate_target(const ImageTarget& target, const Camera& camera) {
-  if (target.format != PixelFormat::kRgba8 && target.format != PixelFormat::kRgbaF32)
-    return invalid("image: unknown pixel format");
-  const size_t pixel_bytes = target.format == PixelFormat::kRgba8 ? 4 : 4 * sizeof(float);
-  if (target.pixels == nullptr) return invalid("image: no pixels");
-  if (target.stride_bytes < pixel_bytes * camera.width_px) {
-    return invalid("image: rows of " + std::to_string(target.stride_bytes) +
-                   " bytes are too short for " + std::to_string(camera.width_px) + " pixels");
-  }
-  if (target.format == PixelFormat::kRgbaF32 &&
-      (target.stride_bytes % alignof(float) != 0 ||
-       reinterpret_cast<uintptr_t>(target.pixels) % alignof(float) != 0)) {
-    return invalid("image: float pixels must be aligned to 4 bytes");
-  }
-  return {};
-}
 
 // The words of an error are put together only where there is one: a frame allocates nothing.
 Status validate_gaussians(const GaussianView& gaussians, size_t index) {
@@ -89,6 +73,10 @@ Status Renderer::Impl::validate(const Frame& frame, const ImageTarget& target,
                                 uint32_t& blocks) const {
   FIG_RETURN_IF_ERROR(validate_camera(frame.camera));
   FIG_RETURN_IF_ERROR(validate_target(target, frame.camera));
+  if (!frame.background && !layout_of(target.format).alpha) {
+    return invalid(std::string("image: ") + to_string(target.format) +
+                   " has no alpha and needs a background");
+  }
   if (!(frame.splat.alpha_cut > 0 && frame.splat.alpha_cut <= 0.5f))
     return invalid("alpha cut: must be above 0 and at most 0.5");
   if (frame.background) {

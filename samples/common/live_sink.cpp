@@ -18,6 +18,7 @@ bool LiveSink::drop_late(uint64_t due_ns) {
 }
 
 Result<bool> LiveSink::show(const RenderedFrame& frame, uint64_t due_ns) {
+  FIG_CHECK(frame.format == format(), "frames of the sink's format");
   if (drop_late(due_ns)) return false;
   const Result<bool> shown = put(frame, next_due_ns(due_ns));
   if (shown.ok()) ++(*shown ? counts_.shown : counts_.dropped);

@@ -38,9 +38,9 @@ class LiveSink {
   // Whether the frame of due_ns is too late, because the one after it is due already; counted as
   // dropped then. For callers that ask before they render.
   bool drop_late(uint64_t due_ns);
-  // Shows the frame that was due at due_ns, or drops it; says which. Waits for a slow receiver
-  // until the next frame is due, no longer; not for the frame's own time: pace is the caller's.
-  // Error: the receiver is gone.
+  // Shows the frame of format() that was due at due_ns, or drops it; says which. Waits for a slow
+  // receiver until the next frame is due, no longer; not for the frame's own time: pace is the
+  // caller's. Error: the receiver is gone.
   Result<bool> show(const RenderedFrame& frame, uint64_t due_ns);
   // Gives the receiver what it has begun to take. Call once, at the end.
   virtual Status finish() { return {}; }

@@ -31,7 +31,7 @@ Result<bool> Y4mPipe::put(const RenderedFrame& frame, uint64_t deadline_ns) {
   const std::span<const std::byte> header = std::as_bytes(std::span(header_));
   bytes_.assign(header.begin(), header.end());
   written_ = 0;
-  ports::append_y4m_frame(drop_alpha(frame.u8), bytes_);
+  ports::append_y4m_frame(frame.u8, bytes_);
   FIG_RETURN_IF_ERROR(write_until(deadline_ns));
   if (written_ == 0) {  // nobody has seen anything of it
     bytes_.clear();

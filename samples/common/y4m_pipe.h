@@ -23,7 +23,7 @@ class Y4mPipe final : public LiveSink {
   // (catch_interrupts). kInvalidArgument for a rate that y4m cannot say.
   static Result<std::unique_ptr<Y4mPipe>> create(int descriptor, const std::string& name,
                                                  ImageSize size, const Options& options);
-  PixelFormat format() const override { return PixelFormat::kRgba8; }
+  PixelFormat format() const override { return PixelFormat::kRgb24; }
   // Waits up to a second for a reader that is in the middle of a frame. kIo if it does not take it.
   Status finish() override;
 

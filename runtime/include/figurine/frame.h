@@ -11,6 +11,7 @@
 #include "figurine/camera.h"
 #include "figurine/gaussian.h"
 #include "figurine/pose.h"
+#include "figurine/ycbcr.h"
 
 namespace figurine {
 
@@ -19,13 +20,26 @@ enum class AvatarId : uint32_t {};
 enum class PixelFormat : uint8_t {
   kRgba8,    // sRGB-encoded as stored in the Gaussians, straight alpha, rounded to nearest
   kRgbaF32,  // the same without rounding or clamping
+  // What screens and cameras take: kRgba8's codes in another order or, by figurine/ycbcr.h, in
+  // limited-range YCbCr. All but kBgra8 have no alpha and need a Frame::background.
+  kBgra8,
+  kRgb24,  // 3 bytes a pixel
+  kBgr24,
+  kYuyv,  // 4:2:2, Y Cb Y Cr (YUY2): chroma of the mean of two neighbours; even width
+  kNv12,  // 4:2:0, a plane of Y and one of Cb Cr: chroma of the mean of 2x2; even width and height
 };
+const char* to_string(PixelFormat format);  // "rgba8", "nv12", ...: for messages
 
 // Where a frame goes: height rows of stride_bytes, top row first. The caller owns the pixels.
 struct ImageTarget {
   void* pixels = nullptr;
   size_t stride_bytes = 0;
   PixelFormat format = PixelFormat::kRgba8;
+  // kNv12 alone: its plane of Cb and Cr, height / 2 rows of chroma_stride_bytes, width bytes of
+  // each in use. Anywhere outside the plane of Y; drivers want it right behind that.
+  void* chroma = nullptr;
+  size_t chroma_stride_bytes = 0;
+  YcbcrMatrix matrix = YcbcrMatrix::kBt709;  // of kYuyv and kNv12
 };
 
 struct SplatOptions {

@@ -16,8 +16,8 @@ struct TileArea {
 };
 
 // Writes the tile's pixels. Null pixels: nothing was blended there. kRgba8 rounds to nearest and
-// clamps, kRgbaF32 does neither. Where nothing was blended and there is no background, all four
-// channels are 0.
+// clamps, kRgbaF32 does neither, all others are kRgba8's codes packed (pixel_layout.h). Where
+// nothing was blended and there is no background, all four channels are 0.
 void resolve_tile(const KernelTable& kernels, const TileArea& area,
                   const kernels::TilePixels* pixels,
                   const std::optional<std::array<float, 3>>& background, const ImageTarget& target);

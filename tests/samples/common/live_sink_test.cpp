@@ -126,7 +126,7 @@ constexpr ImageSize kSize{320, 240};  // 115,200 bytes of planes; a pipe holds 6
 constexpr size_t kFrameBytes = 6 + kSize.width_px * kSize.height_px * 3 / 2;
 
 RenderedFrame grey(uint8_t level) {
-  RenderedFrame frame(kSize, PixelFormat::kRgba8);
+  RenderedFrame frame(kSize, PixelFormat::kRgb24);
   std::fill(frame.u8.pixels.begin(), frame.u8.pixels.end(), level);
   return frame;
 }
