@@ -83,34 +83,47 @@ uint16_t tile_of(float pixel, uint32_t size) {
   return static_cast<uint16_t>(static_cast<uint32_t>(clamped) / uint32_t{kTileSize});
 }
 
-enum class Lane : uint32_t { kVisible, kTransparent, kOutside, kBehindOrNotFinite };
+// Where a centre is seen.
+struct Centre {
+  float position[3];  // in the world
+  float z;            // along the view
+  float tan_x, tan_y;
+  float x, y;  // pixels
+};
 
-Lane project_lane(const ProjectJob& job, uint32_t lane) {
-  const View& view = *job.view;
-  const GaussianBlock& gaussians = *job.gaussians;
-  const float opacity = gaussians.opacity[lane];
-  if (!(opacity > 0) || !is_finite(opacity)) return Lane::kBehindOrNotFinite;
-  if (opacity < view.alpha_cut && (job.leave_out & kLeaveOutTransparent) != 0) {
-    return Lane::kTransparent;
-  }
-
+// False behind the near plane, and for what is not a number.
+bool project_centre(const View& view, const GaussianBlock& gaussians, uint32_t lane,
+                    Centre& centre) {
   const float* m = view.view_from_world;
-  float position[3], seen[3];
-  for (int i = 0; i < 3; ++i) position[i] = gaussians.position_m[i][lane];
+  float seen[3];
+  for (int i = 0; i < 3; ++i) centre.position[i] = gaussians.position_m[i][lane];
   for (int i = 0; i < 3; ++i) {
-    seen[i] = (m[4 * i] * position[0] + m[4 * i + 1] * position[1]) +
-              (m[4 * i + 2] * position[2] + m[4 * i + 3]);
+    seen[i] = (m[4 * i] * centre.position[0] + m[4 * i + 1] * centre.position[1]) +
+              (m[4 * i + 2] * centre.position[2] + m[4 * i + 3]);
   }
-  const float z = seen[2];
-  if (!(z > view.near_m)) return Lane::kBehindOrNotFinite;  // written so that NaN is culled too
-  const float tan_x = seen[0] / z, tan_y = seen[1] / z;
-  const float mean_x = view.fx_px * tan_x + view.cx_px, mean_y = view.fy_px * tan_y + view.cy_px;
+  centre.z = seen[2];
+  if (!(centre.z > view.near_m)) return false;
+  centre.tan_x = seen[0] / centre.z;
+  centre.tan_y = seen[1] / centre.z;
+  centre.x = view.fx_px * centre.tan_x + view.cx_px;
+  centre.y = view.fy_px * centre.tan_y + view.cy_px;
+  return is_finite(centre.x) && is_finite(centre.y);
+}
 
+// The dilated covariance [[a, b], [b, c]] of a splat, in pixels.
+struct Covariance {
+  float a, b, c, determinant;
+};
+
+// False if anything of it is not finite.
+bool project_covariance(const View& view, const GaussianBlock& gaussians, uint32_t lane,
+                        const Centre& centre, Covariance& covariance) {
   // Rows u, v of the projected factor J R F; the 2D covariance is their Gram matrix plus the
   // dilation.
-  const float clamped_x = clamp(tan_x, view.tan_x_min, view.tan_x_max);
-  const float clamped_y = clamp(tan_y, view.tan_y_min, view.tan_y_max);
-  const float focal_x = view.fx_px / z, focal_y = view.fy_px / z;
+  const float* m = view.view_from_world;
+  const float clamped_x = clamp(centre.tan_x, view.tan_x_min, view.tan_x_max);
+  const float clamped_y = clamp(centre.tan_y, view.tan_y_min, view.tan_y_max);
+  const float focal_x = view.fx_px / centre.z, focal_y = view.fy_px / centre.z;
   float u[3], v[3];
   for (int k = 0; k < 3; ++k) {
     const float f0 = gaussians.factor[k][lane], f1 = gaussians.factor[3 + k][lane],
@@ -122,62 +135,102 @@ Lane project_lane(const ProjectJob& job, uint32_t lane) {
     v[k] = focal_y * (gy - clamped_y * gz);
   }
   const float uu = dot(u, u), vv = dot(v, v);
-  const float a = uu + kDilationPx2, b = dot(u, v), c = vv + kDilationPx2;
+  covariance.a = uu + kDilationPx2;
+  covariance.b = dot(u, v);
+  covariance.c = vv + kDilationPx2;
   // a c - b^2 would cancel for needles. By Cauchy-Binet it is the sum of the squared 2x2 minors of
   // [u; v] and of the dilation's terms: all positive.
   const float minors[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
                            u[0] * v[1] - u[1] * v[0]};
-  const float determinant =
+  covariance.determinant =
       dot(minors, minors) + kDilationPx2 * (uu + vv) + kDilationPx2 * kDilationPx2;
-  if (!is_finite(mean_x) || !is_finite(mean_y) || !is_finite(a) || !is_finite(b) || !is_finite(c) ||
-      !is_finite(determinant)) {
-    return Lane::kBehindOrNotFinite;
-  }
+  return is_finite(covariance.a) && is_finite(covariance.b) && is_finite(covariance.c) &&
+         is_finite(covariance.determinant);
+}
 
-  // Where alpha can reach the cut. reach = log2(opacity / cut); 2 ln(opacity / cut) = 2 ln 2 reach.
-  // What is below the cut has a reach of nothing but slack.
+// Where alpha can reach the cut.
+struct Bounds {
+  float reach;                    // u^2 + v^2 there
+  float half_width, half_height;  // pixels
+  float left, right, top, bottom;
+};
+
+Bounds bound(const View& view, float opacity, const Centre& centre, const Covariance& covariance) {
+  // reach = log2(opacity / cut); 2 ln(opacity / cut) = 2 ln 2 reach. What is below the cut has a
+  // reach of nothing but slack.
   constexpr float kTwoLn2 = 1.38629436f;
   const float log2_ratio = log2_float(opacity / view.alpha_cut);
-  const float reach = (log2_ratio > 0 ? log2_ratio : 0.0f) + kReachSlack;
+  Bounds bounds;
+  bounds.reach = (log2_ratio > 0 ? log2_ratio : 0.0f) + kReachSlack;
   // In standard deviations; apart from a and c, so that nothing overflows.
-  const float radius = __builtin_sqrtf(kTwoLn2 * reach) * kBoxSlackRatio;
-  const float half_width = radius * __builtin_sqrtf(a) + kBoxSlackPx;
-  const float half_height = radius * __builtin_sqrtf(c) + kBoxSlackPx;
+  const float radius = __builtin_sqrtf(kTwoLn2 * bounds.reach) * kBoxSlackRatio;
+  bounds.half_width = radius * __builtin_sqrtf(covariance.a) + kBoxSlackPx;
+  bounds.half_height = radius * __builtin_sqrtf(covariance.c) + kBoxSlackPx;
+  bounds.left = centre.x - bounds.half_width;
+  bounds.right = centre.x + bounds.half_width;
+  bounds.top = centre.y - bounds.half_height;
+  bounds.bottom = centre.y + bounds.half_height;
+  return bounds;
+}
+
+// Pixel centres lie between 0.5 and size - 0.5.
+bool touches_image(const View& view, const Bounds& bounds) {
   const float width = static_cast<float>(view.width_px),
               height = static_cast<float>(view.height_px);
-  // Pixel centres lie between 0.5 and size - 0.5.
-  const float left = mean_x - half_width, right = mean_x + half_width, top = mean_y - half_height,
-              bottom = mean_y + half_height;
-  const bool touches =
-      left <= width - 0.5f && right >= 0.5f && top <= height - 0.5f && bottom >= 0.5f;
-  if (!touches && (job.leave_out & kLeaveOutOutside) != 0) return Lane::kOutside;
+  return bounds.left <= width - 0.5f && bounds.right >= 0.5f && bounds.top <= height - 0.5f &&
+         bounds.bottom >= 0.5f;
+}
 
+Splat make_splat(const View& view, float opacity, const float* rgb, const Centre& centre,
+                 const Covariance& covariance, const Bounds& bounds) {
+  constexpr float kLog2E = 1.44269504f;
+  const float scale_u = __builtin_sqrtf(covariance.c / covariance.determinant * (0.5f * kLog2E));
+  return {.mean_x = centre.x,
+          .mean_y = centre.y,
+          .slope = covariance.b / covariance.c,
+          .scale_u = scale_u,
+          .scale_v = __builtin_sqrtf(0.5f * kLog2E / covariance.c),
+          .inverse_scale_u = 1.0f / scale_u,
+          .reach = bounds.reach,
+          .half_height = bounds.half_height,
+          .opacity = opacity,
+          .red = rgb[0],
+          .green = rgb[1],
+          .blue = rgb[2],
+          .widest_dy_px = covariance.b / covariance.a * bounds.half_width,
+          .tile_x_begin = tile_of(bounds.left, view.width_px),
+          .tile_y_begin = tile_of(bounds.top, view.height_px),
+          .tile_x_last = tile_of(bounds.right, view.width_px),
+          .tile_y_last = tile_of(bounds.bottom, view.height_px)};
+}
+
+enum class Lane : uint32_t { kVisible, kTransparent, kOutside, kBehindOrNotFinite };
+
+Lane project_lane(const ProjectJob& job, uint32_t lane) {
+  const View& view = *job.view;
+  const GaussianBlock& gaussians = *job.gaussians;
+  const float opacity = gaussians.opacity[lane];
+  if (!(opacity > 0) || !is_finite(opacity)) return Lane::kBehindOrNotFinite;
+  if (opacity < view.alpha_cut && (job.leave_out & kLeaveOutTransparent) != 0) {
+    return Lane::kTransparent;
+  }
+  Centre centre;
+  Covariance covariance;
+  if (!project_centre(view, gaussians, lane, centre) ||
+      !project_covariance(view, gaussians, lane, centre, covariance)) {
+    return Lane::kBehindOrNotFinite;
+  }
+  const Bounds bounds = bound(view, opacity, centre, covariance);
+  if (!touches_image(view, bounds) && (job.leave_out & kLeaveOutOutside) != 0) {
+    return Lane::kOutside;
+  }
   float direction[3], rgb[3];
-  for (int k = 0; k < 3; ++k) direction[k] = position[k] - view.camera_centre_m[k];
+  for (int k = 0; k < 3; ++k) direction[k] = centre.position[k] - view.camera_centre_m[k];
   const float inverse_length = 1.0f / __builtin_sqrtf(dot(direction, direction));
   for (int k = 0; k < 3; ++k) direction[k] *= inverse_length;
   if (!evaluate_colour(job, lane, direction, rgb)) return Lane::kBehindOrNotFinite;
-
-  constexpr float kLog2E = 1.44269504f;
-  const float scale_u = __builtin_sqrtf(c / determinant * (0.5f * kLog2E));
-  job.splats[lane] = {.mean_x = mean_x,
-                      .mean_y = mean_y,
-                      .slope = b / c,
-                      .scale_u = scale_u,
-                      .scale_v = __builtin_sqrtf(0.5f * kLog2E / c),
-                      .inverse_scale_u = 1.0f / scale_u,
-                      .reach = reach,
-                      .half_height = half_height,
-                      .opacity = opacity,
-                      .red = rgb[0],
-                      .green = rgb[1],
-                      .blue = rgb[2],
-                      .widest_dy_px = b / a * half_width,
-                      .tile_x_begin = tile_of(left, view.width_px),
-                      .tile_y_begin = tile_of(top, view.height_px),
-                      .tile_x_last = tile_of(right, view.width_px),
-                      .tile_y_last = tile_of(bottom, view.height_px)};
-  job.depth_m[lane] = z;
+  job.splats[lane] = make_splat(view, opacity, rgb, centre, covariance, bounds);
+  job.depth_m[lane] = centre.z;
   return Lane::kVisible;
 }
 
