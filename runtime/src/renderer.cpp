@@ -1,5 +1,6 @@
 #include "figurine/renderer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <new>
 #include <string>
@@ -148,7 +149,10 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
   const Result<const KernelTable*> kernels =
       kernels_for(options.isa.value_or(supported_isas().back()));
   if (!kernels.ok()) return kernels.status();
-  Result<ThreadPool> pool = ThreadPool::create(options.threads);
+  uint32_t threads = options.threads;
+  if (threads <= ThreadPool::kMaxThreads && !options.allow_oversubscription)
+    threads = std::min(threads, allowed_cpus());
+  Result<ThreadPool> pool = ThreadPool::create(threads);
   if (!pool.ok()) return pool.status();
   std::unique_ptr<Impl> impl(new (std::nothrow) Impl(std::move(pool).value(), options, **kernels));
   if (impl == nullptr) return out_of_memory("a renderer");
@@ -183,6 +187,8 @@ Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
   impl_->avatars.push_back(std::move(posed).value());
   return AvatarId(impl_->avatars.size() - 1);
 }
+
+uint32_t Renderer::threads() const { return impl_->pool.threads(); }
 
 Precision Renderer::precision(AvatarId avatar) const {
   FIG_CHECK(static_cast<size_t>(avatar) < impl_->avatars.size(), "an avatar that was added");
