@@ -50,7 +50,8 @@ class Renderer {
 
   // Packs the network's weights and allocates what a frame of it needs. precision: fixed point if
   // the avatar has it, otherwise float, unless said. kMismatch if the avatar was made for another
-  // body; kUnsupported if it does not hold the precision.
+  // body; kUnsupported if it does not hold the precision. What was added before, by its content, is
+  // held once: a crowd of one person costs one.
   Result<AvatarId> add_avatar(const Package& avatar, const Package& body,
                               std::optional<Precision> precision = std::nullopt);
   // The same of an avatar that is no package of its own: a population's member (open_member). Its
