@@ -1,5 +1,6 @@
 #include "figurine/renderer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <new>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "runtime/src/base/stage_clock.h"
 #include "runtime/src/kernels/table.h"
+#include "runtime/src/pose/avatar_identity.h"
 #include "runtime/src/pose/posed_avatar.h"
 #include "runtime/src/splat/gaussian_blocks.h"
 #include "runtime/src/splat/pixel_layout.h"
@@ -50,19 +52,24 @@ struct Renderer::Impl {
   Status add(const FrameAvatar& seen, const kernels::View& view, const LeaveOut& leave_out,
              StageClock& clock, FrameStatistics& statistics);
 
-  PosedAvatar& avatar(AvatarId id) { return *avatars[static_cast<size_t>(id)]; }
-  const PosedAvatar& avatar(AvatarId id) const { return *avatars[static_cast<size_t>(id)]; }
+  PosedAvatar& avatar(AvatarId id) { return *avatars[static_cast<size_t>(id)].posed; }
+  const PosedAvatar& avatar(AvatarId id) const { return *avatars[static_cast<size_t>(id)].posed; }
 
   struct SharedBody {
     const uint32_t* texel;  // where the body's arrays lie tells bodies apart
     BodyBlocks blocks;
+  };
+  // One is posed and projected before the next, so equal ones are one.
+  struct AddedAvatar {
+    AvatarIdentity identity;
+    std::shared_ptr<PosedAvatar> posed;
   };
 
   ThreadPool pool;
   uint64_t (*now_ns)();
   const KernelTable& kernels;
   std::vector<std::unique_ptr<SharedBody>> bodies;
-  std::vector<std::unique_ptr<PosedAvatar>> avatars;
+  std::vector<AddedAvatar> avatars;  // by AvatarId
   PoseScratch scratch;
   GaussianArrays gaussians;  // of pose_avatar()
   Rasterizer rasterizer;
@@ -148,7 +155,10 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
   const Result<const KernelTable*> kernels =
       kernels_for(options.isa.value_or(supported_isas().back()));
   if (!kernels.ok()) return kernels.status();
-  Result<ThreadPool> pool = ThreadPool::create(options.threads);
+  uint32_t threads = options.threads;
+  if (threads <= ThreadPool::kMaxThreads && !options.allow_oversubscription)
+    threads = std::min(threads, allowed_cpus());
+  Result<ThreadPool> pool = ThreadPool::create(threads);
   if (!pool.ok()) return pool.status();
   std::unique_ptr<Impl> impl(new (std::nothrow) Impl(std::move(pool).value(), options, **kernels));
   if (impl == nullptr) return out_of_memory("a renderer");
@@ -175,14 +185,23 @@ Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
   if (!blocks.ok()) return blocks.status();
   const Precision held =
       avatar.holds(Precision::kFixedPoint) ? Precision::kFixedPoint : Precision::kFloat32;
-  Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(
-      avatar, body.body(), **blocks, precision.value_or(held), impl_->pool, impl_->kernels);
-  if (!posed.ok()) return posed.status();
+  Impl::AddedAvatar added{identify(avatar, body.body(), precision.value_or(held)), nullptr};
+  for (const Impl::AddedAvatar& other : impl_->avatars) {
+    if (other.identity == added.identity) added.posed = other.posed;
+  }
+  if (added.posed == nullptr) {
+    Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(
+        avatar, body.body(), **blocks, precision.value_or(held), impl_->pool, impl_->kernels);
+    if (!posed.ok()) return posed.status();
+    added.posed = std::move(posed).value();
+  }
   if (!impl_->scratch.ensure(body.body().joint_count(), (*blocks)->count()))
     return out_of_memory("an avatar's pose");
-  impl_->avatars.push_back(std::move(posed).value());
+  impl_->avatars.push_back(std::move(added));
   return AvatarId(impl_->avatars.size() - 1);
 }
+
+uint32_t Renderer::threads() const { return impl_->pool.threads(); }
 
 Precision Renderer::precision(AvatarId avatar) const {
   FIG_CHECK(static_cast<size_t>(avatar) < impl_->avatars.size(), "an avatar that was added");
@@ -235,7 +254,11 @@ uint64_t Renderer::memory_bytes() const {
                    impl_->scratch.memory_bytes();
   for (const std::unique_ptr<Impl::SharedBody>& body : impl_->bodies)
     bytes += body->blocks.memory_bytes();
-  for (const std::unique_ptr<PosedAvatar>& avatar : impl_->avatars) bytes += avatar->memory_bytes();
+  for (auto added = impl_->avatars.begin(); added != impl_->avatars.end(); ++added) {
+    const bool shared = std::any_of(impl_->avatars.begin(), added,
+                                    [&](const auto& other) { return other.posed == added->posed; });
+    if (!shared) bytes += added->posed->memory_bytes();
+  }
   return bytes;
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "ports/host/clock.h"
+#include "ports/host/cpus.h"
 #include "samples/common/machine.h"
 
 namespace figurine::samples {
@@ -24,8 +25,10 @@ std::string isa_names() {
 }  // namespace
 
 void DeviceOptions::add_to(CLI::App& app, bool json_flag) {
-  app.add_option("--threads", threads, "CPU threads; default: as many as there are CPUs, at most 8")
+  app.add_option("--threads", threads,
+                 "CPU threads, no more than usable CPUs; default: one for each, at most 8")
       ->check(CLI::Range(1u, 64u));
+  app.add_flag("--force-threads", force_threads, "more threads than usable CPUs all the same");
   app.add_option(
       "--precision", precision,
       "arithmetic of the network: f32, or q8 (fixed point); default: q8 where the package has it");
@@ -42,7 +45,13 @@ Result<RendererOptions> DeviceOptions::renderer_options() const {
   }
   const Result<Isa> kernels = instruction_set();
   if (!kernels.ok()) return kernels.status();
-  return RendererOptions{.threads = threads != 0 ? threads : std::min(usable_cpus(), 8u),
+  const uint32_t cpus = ports::usable_cpus(), wanted = threads != 0 ? threads : std::min(cpus, 8u);
+  if (wanted > cpus && !force_threads) {
+    std::fprintf(stderr, "figurine: --threads %u: lowered to the %u usable (--force-threads)\n",
+                 wanted, cpus);
+  }
+  return RendererOptions{.threads = force_threads ? wanted : std::min(wanted, cpus),
+                         .allow_oversubscription = force_threads,
                          .now_ns = ports::now_ns,
                          .isa = *kernels};
 }
@@ -62,6 +71,15 @@ Result<Isa> DeviceOptions::instruction_set() const {
                     "' is unsupported in this build or by this CPU; there is " + isa_names());
 }
 
+Result<std::unique_ptr<Renderer>> make_renderer(const RendererOptions& options) {
+  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(options);
+  if (renderer.ok() && (*renderer)->threads() < options.threads) {
+    std::fprintf(stderr, "figurine: %u of %u threads: the system gives no more\n",
+                 (*renderer)->threads(), options.threads);
+  }
+  return renderer;
+}
+
 std::optional<Precision> DeviceOptions::network_precision() const {
   for (const Precision known : {Precision::kFloat32, Precision::kFixedPoint}) {
     if (precision == to_string(known)) return known;
@@ -77,7 +95,7 @@ nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threa
                                     const std::string& precision) {
   const Result<Isa> isa = options.instruction_set();  // renderer_options() has looked at it
   return {{"cpu", cpu_name()},
-          {"cpus", usable_cpus()},
+          {"cpus", ports::usable_cpus()},
           {"threads", threads},
           {"precision", precision},
           {"isa", isa.ok() ? to_string(*isa) : "none"}};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -16,20 +17,26 @@ class App;
 namespace figurine::samples {
 
 struct DeviceOptions {
-  std::string precision;  // empty: the best that an avatar holds
-  std::string isa;        // empty: FIGURINE_ISA of the environment, else the largest there is
-  uint32_t threads = 0;   // 0: as many as there are CPUs, 8 at most
+  std::string precision;       // empty: the best that an avatar holds
+  std::string isa;             // empty: FIGURINE_ISA of the environment, else the largest there is
+  uint32_t threads = 0;        // 0: one a usable CPU, 8 at most
+  bool force_threads = false;  // more than usable CPUs
   bool json = false;
 
   // json_flag: whether the command has the plain --json; bench has one of its own.
   void add_to(CLI::App& app, bool json_flag = true);
-  // kUnsupported for what this build cannot do, never a silent replacement.
+  // kUnsupported for what this build cannot do, never a silent replacement: threads beyond the
+  // usable CPUs are left out with a line on standard error.
   Result<RendererOptions> renderer_options() const;
   // As asked for; without, the renderer's own choice. renderer_options() has looked at it.
   std::optional<Precision> network_precision() const;
   // Of our own kernels: the same pixels with every one. kUnsupported for what is not there.
   Result<Isa> instruction_set() const;
 };
+
+// Renderer::create, with a line on standard error where the system gives fewer threads than asked
+// for.
+Result<std::unique_ptr<Renderer>> make_renderer(const RendererOptions& options);
 
 // "command" and "version", the first fields of every --json output (docs/json.md).
 nlohmann::ordered_json json_header(const char* command);

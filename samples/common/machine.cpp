@@ -1,7 +1,5 @@
 #include "samples/common/machine.h"
 
-#include <sched.h>
-
 #include <cstdlib>
 #include <fstream>
 
@@ -23,13 +21,6 @@ std::string proc_value(const char* path, const std::string& key) {
 }
 
 }  // namespace
-
-uint32_t usable_cpus() {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  return ::sched_getaffinity(0, sizeof(set), &set) == 0 ? static_cast<uint32_t>(CPU_COUNT(&set))
-                                                        : 1;
-}
 
 std::string cpu_name() {
   for (const char* key : {"model name", "Model", "Hardware"}) {

@@ -6,7 +6,6 @@
 
 namespace figurine::samples {
 
-uint32_t usable_cpus();        // that this process may run on
 std::string cpu_name();        // as the kernel prints it, or "unknown"
 uint64_t peak_memory_bytes();  // largest resident size so far (VmHWM); 0 if unknown
 

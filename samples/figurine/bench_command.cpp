@@ -83,7 +83,7 @@ Status open_lane(const BenchOptions& options, RendererOptions renderer_options, 
   first.open_ms = ms_since(start_ns);
   start_ns = ports::now_ns();
   renderer_options.threads = lane.threads;
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
+  Result<std::unique_ptr<Renderer>> renderer = make_renderer(renderer_options);
   if (!renderer.ok()) return renderer.status();
   lane.renderer = std::move(*renderer);
   FIG_RETURN_IF_ERROR(lane.scene->add_to(*lane.renderer, lane.precision));

@@ -30,7 +30,7 @@ Status run_export(const ExportOptions& options) {
   const Result<std::vector<uint32_t>> frames =
       scene->frames({.first = options.frame, .end = options.frame + 1});
   if (!frames.ok()) return frames.status();
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
+  Result<std::unique_ptr<Renderer>> renderer = make_renderer(*renderer_options);
   if (!renderer.ok()) return renderer.status();
   FIG_RETURN_IF_ERROR(scene->add_to(**renderer, options.device.network_precision()));
   const FrameAvatar posed = scene->pose(options.frame)[0];

@@ -90,7 +90,7 @@ Status run_render(const RenderOptions& options) {
   Result<Job> job = prepare(options);
   if (!job.ok()) return job.status();
 
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
+  Result<std::unique_ptr<Renderer>> renderer = make_renderer(*renderer_options);
   if (!renderer.ok()) return renderer.status();
   FIG_RETURN_IF_ERROR(job->scene.add_to(**renderer, options.device.network_precision()));
   const Result<std::vector<Camera>> cameras =
@@ -161,7 +161,7 @@ Status run_render(const RenderOptions& options) {
     json["renderer_memory_bytes"] = (*renderer)->memory_bytes();
     json["peak_memory_bytes"] = peak_memory_bytes();
     json["machine"] =
-        json_machine(options.device, renderer_options->threads, job->scene.precision(**renderer));
+        json_machine(options.device, (*renderer)->threads(), job->scene.precision(**renderer));
     print_json(json);
   }
   return {};

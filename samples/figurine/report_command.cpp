@@ -139,7 +139,7 @@ Result<SceneRenderer> make_scene_renderer(const SceneOptions& options,
                                           std::optional<Precision> precision) {
   Result<Scene> scene = Scene::load(options);
   if (!scene.ok()) return scene.status();
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
+  Result<std::unique_ptr<Renderer>> renderer = make_renderer(renderer_options);
   if (!renderer.ok()) return renderer.status();
   FIG_RETURN_IF_ERROR(scene->add_to(**renderer, precision));
   return SceneRenderer{std::move(*renderer), std::make_unique<Scene>(std::move(*scene))};

@@ -11,6 +11,7 @@
 #include "figurine/renderer.h"
 #include "formats/writer/package_writer.h"
 #include "ports/host/clock.h"
+#include "ports/host/cpus.h"
 #include "ports/host/files.h"
 #include "samples/common/device_options.h"
 #include "samples/common/file_sink.h"
@@ -235,7 +236,7 @@ Status run_sample(SampleOptions options) {
     json["sampler_memory_bytes"] = (*sampler)->memory_bytes();
     json["peak_memory_bytes"] = peak_bytes;  // of the process when the weights were there, the
                                              // package's mapped pages included
-    json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", usable_cpus()}, {"threads", 1}};
+    json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", ports::usable_cpus()}, {"threads", 1}};
     print_json(json);
   } else {
     std::fprintf(stderr, "%s: %s, %u evaluations in %.2f s, weights %s\n", options.output.c_str(),

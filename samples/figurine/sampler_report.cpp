@@ -13,6 +13,7 @@
 #include "figurine/avatar_sampler.h"
 #include "figurine/renderer.h"
 #include "ports/host/clock.h"
+#include "ports/host/cpus.h"
 #include "ports/media/png.h"
 #include "samples/common/device_options.h"
 #include "samples/common/frame_log.h"
@@ -230,7 +231,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   Json json = json_header("report");
   json["date"] = ports::date_utc();
   json["machine"] = {{"cpu", cpu_name()},
-                     {"cpus", usable_cpus()},
+                     {"cpus", ports::usable_cpus()},
                      {"threads", 1},
                      {"precision", "q8"},
                      {"isa", to_string(supported_isas().back())}};

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "figurine/avatar_sampler.h"
+#include "ports/host/cpus.h"
 #include "ports/media/png.h"
 #include "samples/common/device_options.h"
 #include "samples/common/loading.h"
@@ -72,7 +73,7 @@ Result<Golden> draw_golden(const SelftestOptions& options, const RendererOptions
   Result<Scene> scene = Scene::load(options.scene);
   if (!scene.ok()) return scene.status();
   const GoldenFrame& golden = scene->avatar(0).avatar.golden;
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(renderer_options);
+  Result<std::unique_ptr<Renderer>> renderer = make_renderer(renderer_options);
   if (!renderer.ok()) return renderer.status();
   FIG_RETURN_IF_ERROR(scene->add_to(**renderer, precision));
   const ImageSize size{golden.camera.width_px, golden.camera.height_px};
@@ -220,7 +221,7 @@ Status run_sampler_selftest(const Package& package, const std::string& path, boo
     json["sampler"] = path;
     json["passed"] = reason.empty();
     json["golden_seeds"] = rows;
-    json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", usable_cpus()}, {"threads", 1}};
+    json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", ports::usable_cpus()}, {"threads", 1}};
     print_json(json);
   }
   return reason.empty() ? Status()

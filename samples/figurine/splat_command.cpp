@@ -118,7 +118,7 @@ Status run_splat(const SplatCommandOptions& options) {
       options.output, {.size = size, .frame_count = 1, .opaque = background->colour.has_value()});
   if (!sink.ok()) return sink.status();
 
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(*renderer_options);
+  Result<std::unique_ptr<Renderer>> renderer = make_renderer(*renderer_options);
   if (!renderer.ok()) return renderer.status();
   RenderedFrame frame(size, (*sink)->format());
   const GaussianView gaussians[] = {cloud->view()};
@@ -151,7 +151,7 @@ Status run_splat(const SplatCommandOptions& options) {
     json["work"] = log.work_json();
     json["peak_memory_bytes"] = peak_memory_bytes();
     json["machine"] =
-        json_machine(options.device, renderer_options->threads, to_string(Precision::kFloat32));
+        json_machine(options.device, (*renderer)->threads(), to_string(Precision::kFloat32));
     print_json(json);
   }
   return {};

@@ -113,7 +113,8 @@ DynamicNetwork::DynamicNetwork(const Network& network, const FixedPointNetwork& 
       input_.ensure(input_count_) && output_.ensure(size_t{out.size} * out.size * out.channels),
       "memory");
   xnn_runtime_t runtime = nullptr;
-  check(xnn_create_runtime_v4(builder.subgraph(), nullptr, nullptr, pool.handle(), 0, &runtime));
+  check(xnn_create_runtime_v4(builder.subgraph(), nullptr, nullptr, pool.network_pool(), 0,
+                              &runtime));
   runtime_.reset(runtime);
   check(xnn_reshape_runtime(runtime));
   const xnn_external_value values[2] = {{0, input_.data()}, {1, output_.data()}};

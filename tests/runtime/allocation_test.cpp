@@ -173,6 +173,41 @@ void expect_memory_is_what_was_taken(Held held) {
   EXPECT_NEAR(said / taken, 1, 0.2);
 }
 
+// By content: packages read twice and storage used again are what they hold.
+TEST(Allocation, WhatIsAddedAgainIsHeldOnce) {
+  const SyntheticBody body = make_test_body({.uv_size = 32});
+  for (const Held held : {Held::kFloat32, Held::kFixedPoint}) {
+    const SyntheticAvatar avatar = make_test_avatar(body, {.held = held}),
+                          copy = make_test_avatar(body, {.held = held}),
+                          other = make_test_avatar(body, {.seed = 5, .held = held});
+    const std::unique_ptr<Renderer> renderer = make_renderer();
+    const auto add = [&](const SyntheticAvatar& added) {
+      const Result<AvatarId> id = renderer->add_avatar(*added.package, *body.package);
+      EXPECT_TRUE(id.ok());
+      return *id;
+    };
+    const AvatarId first = add(avatar);
+    const uint64_t one = renderer->memory_bytes();
+    const int64_t before = g_held_bytes;
+    std::vector<AvatarId> crowd;
+    for (int i = 0; i < 200; ++i) crowd.push_back(add(i % 2 == 0 ? avatar : copy));
+    EXPECT_LT(renderer->memory_bytes(), 2 * one) << "200 times " << one << " bytes";
+    EXPECT_LT(g_held_bytes - before, static_cast<int64_t>(one));
+    EXPECT_NE(crowd.front(), first);
+
+    const AvatarId different = add(other);
+    EXPECT_GT(renderer->memory_bytes(), 3 * one / 2);
+    const SyntheticPose pose = make_test_pose(body.body(), 1);
+    const auto opacities = [&](AvatarId id) {
+      const Result<GaussianView> posed = renderer->pose_avatar(id, pose.view());
+      EXPECT_TRUE(posed.ok());
+      return std::vector<float>(posed->opacity.begin(), posed->opacity.end());
+    };
+    EXPECT_EQ(opacities(crowd.back()), opacities(first));
+    EXPECT_NE(opacities(different), opacities(first));
+  }
+}
+
 TEST(Allocation, MemoryBytesIsWhatWasTaken) {
   if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
   expect_memory_is_what_was_taken(Held::kFloat32);

@@ -199,21 +199,5 @@ TEST(NetworkRunner, RefusesWeightsThatDoNotFit) {
   EXPECT_EQ(runner.status().code(), StatusCode::kCorrupt);
 }
 
-TEST(ThreadPool, VisitsEveryIndexOnce) {
-  for (uint32_t threads : {1u, 2u, 5u}) {
-    Result<ThreadPool> pool = ThreadPool::create(threads);
-    ASSERT_TRUE(pool.ok());
-    std::vector<int> visits(1000, 0);
-    pool->for_each(visits.size(), [&](size_t i) { ++visits[i]; });
-    pool->for_each(visits.size(), [&](size_t i) { ++visits[i]; }, ThreadPool::Afterwards::kSleep);
-    EXPECT_EQ(visits, std::vector<int>(1000, 2)) << threads << " threads";
-  }
-}
-
-TEST(ThreadPool, RefusesNoneAndTooMany) {
-  EXPECT_EQ(ThreadPool::create(0).status().code(), StatusCode::kInvalidArgument);
-  EXPECT_EQ(ThreadPool::create(65).status().code(), StatusCode::kInvalidArgument);
-}
-
 }  // namespace
 }  // namespace figurine

@@ -64,7 +64,8 @@ struct FloatImage {
 };
 
 inline std::unique_ptr<Renderer> make_renderer(uint32_t threads = 1) {
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = threads});
+  Result<std::unique_ptr<Renderer>> renderer =
+      Renderer::create({.threads = threads, .allow_oversubscription = true});
   FIG_CHECK(renderer.ok(), renderer.status().message().c_str());
   return std::move(renderer).value();
 }

@@ -83,7 +83,7 @@ Camera front_camera(uint32_t size_px, float distance_m, float vertical_fov_deg) 
 
 Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads,
              float alpha_cut) {
-  const auto renderer = Renderer::create({.threads = threads});
+  const auto renderer = Renderer::create({.threads = threads, .allow_oversubscription = true});
   if (!renderer.ok()) stop(renderer.status());
   Picture picture;
   picture.rgba.assign(size_t(camera.width_px) * camera.height_px * 4,

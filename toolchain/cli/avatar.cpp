@@ -6,13 +6,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/cli/train_all.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
+#include "toolchain/train/threads.h"
 #include "toolchain/train/trainer.h"
 
 namespace figurine::cli {
@@ -88,7 +89,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   }
 }
 
-uint32_t core_count() { return std::clamp(std::thread::hardware_concurrency(), 1u, 16u); }
+uint32_t core_count() { return train::default_threads(); }
 
 // Two one-thread trainings on two cores do more than one of two threads after the other
 // (docs/training.md).
@@ -99,6 +100,16 @@ uint32_t thread_count(const AvatarArguments& arguments) {
 uint32_t slot_count(const AvatarArguments& arguments) {
   return arguments.slots > 0 ? arguments.slots
                              : std::max(1u, core_count() / thread_count(arguments));
+}
+
+// Sums are in another order with another number of threads.
+void say_threads(const std::string& run, uint32_t before, uint32_t now) {
+  if (now == before) {
+    std::printf("%s: goes on with %u threads, as it began\n", run.c_str(), now);
+  } else {
+    std::printf("%s: goes on with %u threads, began with %u: its end will differ in rounding\n",
+                run.c_str(), now, before);
+  }
 }
 
 train::TrainRequest make_request(const AvatarArguments& arguments, const std::string& data,
@@ -125,6 +136,9 @@ train::TrainRequest make_request(const AvatarArguments& arguments, const std::st
         throw InputError(run + ": --resume goes on with the run's own settings; " + key +
                          " differs from run.json");
     }
+    if (arguments.threads > 0) request.settings.threads = arguments.threads;
+    if (!arguments.quiet && !arguments.all && old.json.value("status", "") != "finished")
+      say_threads(run, old.settings.threads, request.settings.threads);
   } else {
     if (request.data.empty()) throw InputError("--data is needed for a new run");
     if (request.body.empty()) throw InputError("--body is needed for a new run");
@@ -133,8 +147,8 @@ train::TrainRequest make_request(const AvatarArguments& arguments, const std::st
     request.settings = train::preset_settings(arguments.preset.value_or("edge"));
     request.settings.bf16 = train::has_fast_bf16();
     overlay(arguments, request.settings);
+    request.settings.threads = thread_count(arguments);
   }
-  request.settings.threads = thread_count(arguments);
   return request;
 }
 
@@ -234,8 +248,10 @@ void add_avatar_command(CLI::App& app) {
                       "Iterations of fitting reference Gaussians first (default 0)");
   command
       ->add_option("--threads", arguments->threads,
-                   "Of a training (default: all cores; with --all: 1)")
-      ->check(CLI::Range(1, 256));
+                   "Of a training (default: usable CPUs, at most 16; with --all: 1; with "
+                   "--resume: as many as the run began with)")
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   command
       ->add_option(
           "--slots", arguments->slots,

@@ -8,14 +8,15 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "figurine/package.h"
+#include "ports/host/cpus.h"
 #include "ports/host/files.h"
 #include "ports/media/png.h"
 #include "toolchain/body/clip.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
@@ -151,7 +152,7 @@ void run_capture(CaptureOptions options) {
     request.first_identity = static_cast<uint32_t>(options.identity);
     request.identities = 1;
   }
-  if (request.threads == 0) request.threads = std::max(1u, std::thread::hardware_concurrency());
+  if (request.threads == 0) request.threads = ports::usable_cpus();
   request.tool = "figurine-train " FIGURINE_VERSION;
 
   const train::InterruptGuard interrupt;
@@ -223,7 +224,8 @@ void add_capture_command(CLI::App& app) {
       ->add_option("--folds", options->folds,
                    "Folds of clothes: of every pose, frozen as at rest, or off")
       ->capture_default_str();
-  command->add_option("--threads", request.threads, "0: as many as the machine has");
+  command->add_option("--threads", request.threads, "Default: as many as usable CPUs")
+      ->transform(usable_threads());
   command->add_flag("--resume", request.resume,
                     "Go on where an interrupted run of the same command stopped");
   command->add_option(

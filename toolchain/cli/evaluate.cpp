@@ -9,17 +9,18 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "ports/host/files.h"
 #include "ports/media/png.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/contact_sheet.h"
 #include "toolchain/evaluate/quantization.h"
 #include "toolchain/evaluate/reconstruction.h"
 #include "toolchain/evaluate/requantization.h"
 #include "toolchain/train/avatar_file.h"
+#include "toolchain/train/threads.h"
 #include "toolchain/verify/parity.h"
 
 namespace figurine::cli {
@@ -194,7 +195,8 @@ void add_run_options(CLI::App* command, const std::shared_ptr<EvaluateArguments>
   command->add_option("--body", arguments->open.body,
                       "Where the body is now (default: where the run found it)");
   command->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");
 }
 
@@ -204,7 +206,7 @@ void add_evaluate_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("evaluate", "Measure trained avatars");
   command->require_subcommand(1);
   auto arguments = std::make_shared<EvaluateArguments>();
-  arguments->open.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  arguments->open.threads = train::default_threads();
 
   CLI::App* reconstruction =
       command->add_subcommand("reconstruction", "Held-out cameras and poses against the truth");
@@ -236,7 +238,8 @@ void add_evaluate_command(CLI::App& app) {
                    "Cameras of a held-out pose (default 4)")
       ->check(CLI::PositiveNumber);
   quantization->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   quantization->add_flag("--quiet", arguments->quantization.quiet, "No progress");
   quantization->add_option("-o,--output", arguments->output, "Report to write, JSON");
   quantization->callback([arguments] { run_quantization(*arguments); });
@@ -255,7 +258,8 @@ void add_evaluate_command(CLI::App& app) {
       ->check(CLI::PositiveNumber);
   population->add_flag("--quiet", arguments->requantization.quiet, "No progress");
   population->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   population->add_option("-o,--output", arguments->output, "Report to write, JSON");
   population->callback([arguments] { run_population(*arguments); });
 

@@ -5,13 +5,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/retrieval.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
+#include "toolchain/train/threads.h"
 
 namespace figurine::cli {
 
@@ -85,7 +86,7 @@ void run(const FeaturesArguments& arguments) {
 
 void add_evaluate_features_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<FeaturesArguments>();
-  arguments->options.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  arguments->options.threads = train::default_threads();
   CLI::App* command = evaluate.add_subcommand(
       "features", "How well networks find people again in other poses, against chance and pixels");
   command
@@ -110,7 +111,8 @@ void add_evaluate_features_command(CLI::App& evaluate) {
       ->check(CLI::Range(2, 64));
   command->add_option("-o,--output", arguments->output, "Report to write, JSON")->required();
   command->add_option("--threads", arguments->options.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   command->add_flag("--quiet", arguments->options.quiet, "No progress, no summary");
   command->callback([arguments] { run(*arguments); });
 }

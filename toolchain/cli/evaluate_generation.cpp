@@ -11,10 +11,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/captured_people.h"
 #include "toolchain/evaluate/generation.h"
@@ -348,7 +348,7 @@ void run_sampling(const SamplingArguments& arguments) {
 
 void add_evaluate_generation_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<GenerationArguments>();
-  arguments->threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  arguments->threads = train::default_threads();
   CLI::App* command = evaluate.add_subcommand(
       "generation", "Sampled people against held-out and training ones, and rows to be beaten");
   command
@@ -383,7 +383,8 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
       ->check(CLI::Range(10, 100000));
   command->add_option("--seed", arguments->options.seed, "Of baselines and bootstrap (default 0)");
   command->add_option("--threads", arguments->threads, "Default: all cores")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   command->add_flag("--baselines,!--no-baselines", arguments->baselines,
                     "The rows that need no training (default: yes)");
   command->add_flag("--quiet", arguments->quiet, "No progress, no table");
@@ -414,7 +415,8 @@ void add_evaluate_sampling_command(CLI::App& evaluate) {
   command
       ->add_option("--threads", arguments->threads,
                    "Of the float network (default 1: seconds are one core's)")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   command->add_flag("--quiet", arguments->options.quiet, "No progress, no table");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");
   command->callback([arguments] { run_sampling(*arguments); });

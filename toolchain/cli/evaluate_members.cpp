@@ -7,15 +7,16 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/member_sheets.h"
 #include "toolchain/evaluate/members.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
+#include "toolchain/train/threads.h"
 
 namespace figurine::cli {
 
@@ -160,7 +161,7 @@ void run_members(const MembersArguments& arguments) {
 
 void add_evaluate_members_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<MembersArguments>();
-  arguments->threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  arguments->threads = train::default_threads();
   CLI::App* command = evaluate.add_subcommand(
       "members", "What a population is like: quality, distances, spectrum, span, mixtures");
   command->add_option("POPULATION", arguments->population, "Population package")->required();
@@ -184,7 +185,8 @@ void add_evaluate_members_command(CLI::App& evaluate) {
       ->delimiter(',')
       ->check(CLI::PositiveNumber);
   command->add_option("--threads", arguments->threads, "Default: all cores")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   command->add_flag("--quiet", arguments->quiet, "No progress");
   command->callback([arguments] { run_members(*arguments); });
 }

@@ -4,12 +4,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/feature_trainer.h"
 #include "toolchain/train/run_directory.h"
+#include "toolchain/train/threads.h"
 
 namespace figurine::cli {
 
@@ -34,7 +35,7 @@ void run(evaluate::FeatureRequest request) {
 void add_features_command(CLI::App& app) {
   auto request = std::make_shared<evaluate::FeatureRequest>();
   evaluate::FeatureSettings& settings = request->settings;
-  request->threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  request->threads = train::default_threads();
   CLI::App* command = app.add_subcommand(
       "features", "Train figurine-features, through which pictures of avatars are compared");
   command
@@ -66,7 +67,8 @@ void add_features_command(CLI::App& app) {
   command
       ->add_option("--threads", request->threads,
                    "Default: all cores; the result does not depend on it")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   command->add_flag("--resume", request->resume,
                     "Go on from the checkpoint beside the output, by its own settings");
   command->add_flag("--quiet", request->quiet, "No progress, no summary");

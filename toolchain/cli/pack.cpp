@@ -5,10 +5,10 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
-#include <thread>
 
 #include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/generate/pack_sampler.h"
 #include "toolchain/generate/sampler_trainer.h"
@@ -16,6 +16,7 @@
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/pack_population.h"
+#include "toolchain/train/threads.h"
 #include "toolchain/verify/parity.h"
 
 namespace figurine::cli {
@@ -157,7 +158,7 @@ void run(const PackArguments& arguments) {
 
 void add_pack_command(CLI::App& app) {
   auto arguments = std::make_shared<PackArguments>();
-  arguments->open.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+  arguments->open.threads = train::default_threads();
   CLI::App* command = app.add_subcommand(
       "pack", "Write a run's avatar or sampler as a package, or many avatars as a population");
   command
@@ -213,7 +214,8 @@ void add_pack_command(CLI::App& app) {
                    "Of the fine-tune (default 400)")
       ->check(CLI::PositiveNumber);
   command->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   command->add_flag("--golden,!--no-golden", arguments->pack.golden,
                     "Carry an expected picture (default)");
   command->add_option("--name", arguments->pack.name,

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <memory>
-#include <thread>
 
+#include "ports/host/cpus.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/population/build.h"
 
@@ -13,7 +13,7 @@ namespace figurine::cli {
 void add_population_command(CLI::App& app) {
   auto options = std::make_shared<population::BuildOptions>();
   auto minutes = std::make_shared<double>(0);
-  options->slots = std::clamp(std::thread::hardware_concurrency(), 1u, 64u);
+  options->slots = std::min(ports::usable_cpus(), 64u);
   CLI::App* command = app.add_subcommand(
       "population",
       "Make many people by a recipe: captures, initial weights, avatars, one package");

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/threads.h"
 #include "toolchain/generate/sampler_trainer.h"
 #include "toolchain/train/run_directory.h"
 
@@ -128,7 +129,8 @@ void add_sampler_command(CLI::App& app) {
   command
       ->add_option("--threads", settings.threads,
                    "Default: all cores; with --resume as many as the run began with")
-      ->check(CLI::Range(1, 256));
+      ->check(CLI::Range(1, 256))
+      ->transform(usable_threads());
   CLI::Option* iterations =
       command->add_option("--iterations", arguments->iterations, "Budget (default 10000)")
           ->check(CLI::PositiveNumber);

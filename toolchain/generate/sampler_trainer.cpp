@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
-#include <thread>
 
 #include "figurine/noise_level.h"
 #include "ports/host/folder_lock.h"
@@ -220,8 +219,7 @@ Plan make_plan(const SamplerRequest& request, const train::PackageFile& populati
     throw InputError(request.run + ": no run to resume (run.json is missing)");
   Plan plan{.settings = request.settings, .description = {}};
   if (!exists) {
-    if (plan.settings.threads == 0)
-      plan.settings.threads = std::clamp(std::thread::hardware_concurrency(), 1u, 16u);
+    if (plan.settings.threads == 0) plan.settings.threads = train::default_threads();
     return plan;
   }
   plan.description = read_run(run);

@@ -2,6 +2,12 @@
 
 #include <ATen/Parallel.h>
 #include <dlfcn.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "ports/host/cpus.h"
 
 namespace figurine::train {
 
@@ -11,6 +17,14 @@ void use_threads(uint32_t count) {
   if (void* function = dlsym(RTLD_DEFAULT, "openblas_set_num_threads")) {
     reinterpret_cast<void (*)(int)>(function)(static_cast<int>(count));
   }
+}
+
+uint32_t default_threads() { return std::min(ports::usable_cpus(), 16u); }
+
+void wait_without_spinning(char** arguments) {
+  if (std::getenv("OMP_WAIT_POLICY") != nullptr || std::getenv("GOMP_SPINCOUNT") != nullptr) return;
+  ::setenv("GOMP_SPINCOUNT", "1000", 0);  // looks, about 50 us
+  ::execv("/proc/self/exe", arguments);   // where that is not possible, threads spin
 }
 
 }  // namespace figurine::train

@@ -24,7 +24,10 @@
 namespace figurine {
 
 struct RendererOptions {
-  uint32_t threads = 1;  // 1 to 64
+  // 1 to 64, the caller's own counted. No more are started than the CPUs that the process may run
+  // on, and fewer where the system gives no more: threads() says how many.
+  uint32_t threads = 1;
+  bool allow_oversubscription = false;  // more threads than CPUs: slower, for tests and experiments
   // The runtime has no clock of its own: with one, render() fills stage_ns.
   uint64_t (*now_ns)() = nullptr;
   // Which kernels run: the same pixels with every one. None: the largest set of supported_isas().
@@ -47,13 +50,15 @@ class Renderer {
 
   // Packs the network's weights and allocates what a frame of it needs. precision: fixed point if
   // the avatar has it, otherwise float, unless said. kMismatch if the avatar was made for another
-  // body; kUnsupported if it does not hold the precision.
+  // body; kUnsupported if it does not hold the precision. What was added before, by its content, is
+  // held once: a crowd of one person costs one.
   Result<AvatarId> add_avatar(const Package& avatar, const Package& body,
                               std::optional<Precision> precision = std::nullopt);
   // The same of an avatar that is no package of its own: a population's member (open_member). Its
   // arrays are borrowed likewise; their meaning must have been verified, as open_member's is.
   Result<AvatarId> add_avatar(const Avatar& avatar, const Package& body,
                               std::optional<Precision> precision = std::nullopt);
+  uint32_t threads() const;                    // that frames are drawn with
   Precision precision(AvatarId avatar) const;  // of an avatar that was added
 
   // Draws one frame. kInvalidArgument on an unsound camera, pose, target or Gaussian count; nothing

@@ -1,74 +1,83 @@
 #include "runtime/src/base/thread_pool.h"
 
+#include <pthread.h>
 #include <pthreadpool.h>
+#include <sched.h>
+#include <signal.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
+#include <new>
 #include <string>
-
-#if defined(__SANITIZE_THREAD__)
-#include <sanitizer/tsan_interface.h>
-#endif
+#include <utility>
 
 namespace figurine {
 namespace {
 
-using Task = void (*)(void*, size_t);
-
-#if defined(__SANITIZE_THREAD__)
-// The pool's library is not instrumented, so the sanitizer does not see that a loop starts after
-// its caller's writes and ends before its reads. Two marks say so; tasks of one loop stay unordered
-// between each other, and their races are found.
-struct Marked {
-  Task task;
-  void* context;
-  char begin = 0, end = 0;
-};
-
-void run_marked(void* context, size_t i) {
-  Marked& marked = *static_cast<Marked*>(context);
-  __tsan_acquire(&marked.begin);
-  marked.task(marked.context, i);
-  __tsan_release(&marked.end);
+// How many threads, `wanted` at most, the system would start now. The system's pthreadpool_create
+// waits for ever for one that it could not start, so this starts them first, all at once, and ends
+// them again.
+uint32_t count_startable(uint32_t wanted) {
+  struct Probe {
+    std::atomic<uint32_t>* over = nullptr;
+    pthread_t thread{};
+    std::atomic<pid_t> id{0};
+  };
+  std::atomic<uint32_t> over{0};
+  const std::unique_ptr<Probe[]> probes(new (std::nothrow) Probe[wanted]);
+  if (probes == nullptr) return 0;
+  const auto probe = [](void* argument) -> void* {
+    Probe& self = *static_cast<Probe*>(argument);
+    self.id.store(::gettid());
+    self.over->wait(0);
+    return nullptr;
+  };
+  uint32_t started = 0;
+  for (; started < wanted; ++started) {
+    probes[started].over = &over;
+    if (::pthread_create(&probes[started].thread, nullptr, probe, &probes[started]) != 0) break;
+  }
+  over.store(1);
+  over.notify_all();
+  for (uint32_t i = 0; i < started; ++i) {
+    ::pthread_join(probes[i].thread, nullptr);
+    // A joined thread counts against the user's limit for a moment longer, until the kernel has
+    // forgotten its number.
+    while (::tgkill(::getpid(), probes[i].id.load(), 0) == 0) ::sched_yield();
+  }
+  return started;
 }
-
-void parallelize(pthreadpool* pool, Task task, void* context, size_t count, uint32_t flags) {
-  Marked marked{.task = task, .context = context};
-  __tsan_release(&marked.begin);
-  pthreadpool_parallelize_1d(pool, run_marked, &marked, count, flags);
-  __tsan_acquire(&marked.end);
-}
-#else
-void parallelize(pthreadpool* pool, Task task, void* context, size_t count, uint32_t flags) {
-  pthreadpool_parallelize_1d(pool, task, context, count, flags);
-}
-#endif
 
 }  // namespace
 
+void ThreadPool::PoolDeleter::operator()(pthreadpool* pool) const { ::pthreadpool_destroy(pool); }
+
+ThreadPool::ThreadPool(std::unique_ptr<WorkerPool> workers, pthreadpool* network)
+    : workers_(std::move(workers)), network_(network) {}
+ThreadPool::ThreadPool(ThreadPool&& other) noexcept = default;
+ThreadPool::~ThreadPool() = default;
+
 Result<ThreadPool> ThreadPool::create(uint32_t threads) {
-  if (threads < 1 || threads > 64) {
+  if (threads < 1 || threads > kMaxThreads) {
     return Status(StatusCode::kInvalidArgument,
                   "threads: must be between 1 and 64, not " + std::to_string(threads));
   }
-  if (threads == 1) return ThreadPool(nullptr, 1);
-  pthreadpool* handle = pthreadpool_create(threads);
-  if (handle == nullptr)
-    return Status(StatusCode::kOutOfMemory,
-                  "threads: the system cannot start " + std::to_string(threads));
-  return ThreadPool(handle, threads);
+  // Half of them for XNNPACK.
+  if (threads > 1) threads = 1 + count_startable(2 * (threads - 1)) / 2;
+  pthreadpool* const network = threads > 1 ? ::pthreadpool_create(threads) : nullptr;
+  ThreadPool pool(WorkerPool::create(threads), network);
+  if (pool.workers_ == nullptr || (threads > 1 && network == nullptr))
+    return Status(StatusCode::kOutOfMemory, "threads: no memory for a pool");
+  return pool;
 }
 
-ThreadPool::~ThreadPool() {
-  if (handle_ != nullptr) pthreadpool_destroy(handle_);
-}
-
-void ThreadPool::run(size_t count, void (*task)(void*, size_t), void* context,
-                     Afterwards afterwards) {
-  if (handle_ == nullptr || count <= 1) {
-    for (size_t i = 0; i < count; ++i) task(context, i);
-    return;
-  }
-  parallelize(handle_, task, context, count,
-              afterwards == Afterwards::kSleep ? PTHREADPOOL_FLAG_YIELD_WORKERS : 0);
+uint32_t allowed_cpus() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  // A machine with more CPUs than the set has room for has more than a pool has threads.
+  if (::sched_getaffinity(0, sizeof(set), &set) != 0) return ThreadPool::kMaxThreads;
+  return static_cast<uint32_t>(std::max(CPU_COUNT(&set), 1));
 }
 
 }  // namespace figurine

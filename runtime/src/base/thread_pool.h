@@ -1,14 +1,14 @@
-// One set of threads for everything: XNNPACK's operators and our own loops share a pthreadpool.
-//
-// Tasks of a loop are handed out dynamically, so a loop's result may depend on its own index only,
-// never on which thread ran it.
+// The runtime's threads: workers for its own loops (worker_pool.h), and beside them the pthreadpool
+// that XNNPACK insists on. A program may link drop_in_pthreadpool.cpp, whose pthreadpool gives way
+// as well; the system's waits by spinning.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <utility>
+#include <memory>
 
 #include "figurine/status.h"
+#include "runtime/src/base/worker_pool.h"
 
 struct pthreadpool;
 
@@ -16,35 +16,42 @@ namespace figurine {
 
 class ThreadPool {
  public:
-  // 1 to 64 threads, the caller's own counted. One thread needs no pool at all.
+  static constexpr uint32_t kMaxThreads = WorkerPool::kMaxThreads;
+
+  // 1 to 64 threads, the caller's own counted. Fewer where the system does not give so many:
+  // threads() says how many there are. kInvalidArgument, kOutOfMemory.
   static Result<ThreadPool> create(uint32_t threads);
-  ThreadPool(ThreadPool&& other) noexcept
-      : handle_(std::exchange(other.handle_, nullptr)), threads_(other.threads_) {}
+  ThreadPool(ThreadPool&& other) noexcept;
   ThreadPool& operator=(ThreadPool&&) = delete;
   ~ThreadPool();
 
-  enum class Afterwards : uint8_t {
-    kSpin,   // workers expect another loop soon
-    kSleep,  // the last loop of a frame: workers give their cores back
-  };
-
-  // task(i) for every i in [0, count), in any order, on any thread; returns when all are done.
+  // task(i) for every i in [0, count), in any order, on any thread; returns when all are done. See
+  // WorkerPool::run.
   template <class Task>
-  void for_each(size_t count, const Task& task, Afterwards afterwards = Afterwards::kSpin) {
-    run(
-        count, [](void* context, size_t i) { (*static_cast<const Task*>(context))(i); },
-        const_cast<Task*>(&task), afterwards);
+  void for_each(size_t count, const Task& task) {
+    workers_->run(
+        count,
+        [](void* context, WorkerPool::Loop& loop, uint32_t) {
+          for (size_t i; loop.next(i);) (*static_cast<const Task*>(context))(i);
+        },
+        const_cast<Task*>(&task));
   }
 
-  uint32_t threads() const { return threads_; }
-  pthreadpool* handle() const { return handle_; }  // null for one thread, as XNNPACK wants it
+  uint32_t threads() const { return workers_->threads(); }
+  // Of as many threads. Null for one thread, as XNNPACK wants it.
+  pthreadpool* network_pool() const { return network_.get(); }
 
  private:
-  ThreadPool(pthreadpool* handle, uint32_t threads) : handle_(handle), threads_(threads) {}
-  void run(size_t count, void (*task)(void*, size_t), void* context, Afterwards afterwards);
+  struct PoolDeleter {
+    void operator()(pthreadpool* pool) const;
+  };
+  ThreadPool(std::unique_ptr<WorkerPool> workers, pthreadpool* network);
 
-  pthreadpool* handle_ = nullptr;
-  uint32_t threads_ = 1;
+  std::unique_ptr<WorkerPool> workers_;
+  std::unique_ptr<pthreadpool, PoolDeleter> network_;
 };
+
+// CPUs that this process may run on, by its affinity mask.
+uint32_t allowed_cpus();
 
 }  // namespace figurine

@@ -52,8 +52,8 @@ Status GraphBuilder::build(std::span<void* const> buffers, ThreadPool& pool, Xnn
       FIG_RETURN_IF_ERROR(define_layer(i).within("layer " + std::to_string(i)));
   }
   xnn_runtime_t created = nullptr;
-  const xnn_status packed =
-      xnn_create_runtime_v4(subgraph, nullptr, nullptr, pool.handle(), 0, &created);
+  const xnn_status packed = xnn_create_runtime_v4(subgraph, nullptr, nullptr, pool.network_pool(),
+                                                  XNN_FLAG_YIELD_WORKERS, &created);
   runtime.reset(created);
   FIG_RETURN_IF_ERROR(xnnpack_status(packed, "packing the network"));
   FIG_RETURN_IF_ERROR(xnnpack_status(xnn_reshape_runtime(created), "planning the network"));

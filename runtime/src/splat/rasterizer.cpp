@@ -150,12 +150,9 @@ void Rasterizer::draw(const ImageTarget& target,
       band = bins_.fill_band(band.end);
     }
     const uint64_t begin_ns = clock.now();
-    pool_.for_each(
-        band.end - band.begin,
-        [&](size_t i) {
-          blend_tile(band.begin + static_cast<uint32_t>(i), target, background, clock);
-        },
-        band.end == tiles ? ThreadPool::Afterwards::kSleep : ThreadPool::Afterwards::kSpin);
+    pool_.for_each(band.end - band.begin, [&](size_t i) {
+      blend_tile(band.begin + static_cast<uint32_t>(i), target, background, clock);
+    });
     finish_band(band, clock.now() - begin_ns, clock);
   }
 }

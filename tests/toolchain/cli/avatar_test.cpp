@@ -1,0 +1,73 @@
+// figurine-train avatar --resume keeps the run's number of threads, or says that it does not; what
+// all commands have with --threads.
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "gtest/gtest.h"
+#include "ports/host/cpus.h"
+#include "samples/program.h"
+#include "tests/toolchain/train/small_capture.h"
+
+namespace figurine::cli {
+namespace {
+
+using testing_tools::small_capture;
+using tests::ProgramRun;
+using tests::TestFolder;
+
+ProgramRun train(const TestFolder& folder, const std::string& arguments) {
+  return tests::run_shell(FIGURINE_TRAIN " avatar -o run " + arguments, folder);
+}
+
+// A run of two iterations on one thread, as it is when it was stopped after the last.
+void write_stopped_run(const TestFolder& folder) {
+  const ProgramRun run =
+      train(folder, "--data " + small_capture().data + " --body " + small_capture().body +
+                        " --preset nano --iterations 2 --threads 1 --quiet");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string path = folder.path("run/run.json");
+  nlohmann::json json;
+  std::ifstream(path) >> json;
+  ASSERT_EQ(json.at("settings").at("threads"), 1);
+  json["status"] = "interrupted";
+  std::ofstream(path) << json;
+}
+
+TEST(AvatarCommand, AResumedRunKeepsItsThreadsAndSaysSo) {
+  const TestFolder folder;
+  write_stopped_run(folder);
+  const ProgramRun resumed = train(folder, "--resume");
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_NE(resumed.out.find("run: goes on with 1 threads, as it began"), std::string::npos)
+      << resumed.out;
+  const ProgramRun finished = train(folder, "--resume");
+  EXPECT_EQ(finished.out.find("goes on"), std::string::npos) << finished.out;
+}
+
+TEST(AvatarCommand, ItSaysWhereThreadsAreOthersThanBefore) {
+  const TestFolder folder;
+  write_stopped_run(folder);
+  const ProgramRun resumed = train(folder, "--resume --threads 2 --force-threads");
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_NE(resumed.out.find("goes on with 2 threads, began with 1"), std::string::npos)
+      << resumed.out;
+}
+
+TEST(ThreadsOption, AboveTheUsableCpusIsLoweredWithALineUnlessForced) {
+  const TestFolder folder;
+  write_stopped_run(folder);
+  const std::string cpus = std::to_string(ports::usable_cpus());
+  const ProgramRun lowered = train(folder, "--resume --threads 200");
+  EXPECT_EQ(lowered.exit_code, 0) << lowered.err;
+  EXPECT_NE(lowered.err.find("--threads 200: lowered to the " + cpus + " usable"),
+            std::string::npos)
+      << lowered.err;
+  EXPECT_EQ(std::count(lowered.err.begin(), lowered.err.end(), '\n'), 1) << lowered.err;
+  for (const char* bad : {"1000", "many", "-1", "1000 --force-threads"})
+    EXPECT_EQ(train(folder, std::string("--resume --threads ") + bad).exit_code, 2) << bad;
+}
+
+}  // namespace
+}  // namespace figurine::cli
