@@ -19,7 +19,7 @@ constexpr double kTwoPi = 6.283185307179586;
 constexpr double kBlurs_px[] = {0.5, 1, 2}, kNoises[] = {0.01, 0.03, 0.1};
 
 // Pictures of some members, [members][shots], and which shots are of other poses and other sides.
-struct Sitting {
+struct PictureSet {
   std::vector<std::vector<Picture>> pictures;
   std::vector<std::pair<size_t, size_t>> shot_pairs;  // query, gallery
 
@@ -33,20 +33,20 @@ struct Sitting {
   size_t shots() const { return pictures[0].size(); }
 };
 
-Sitting draw_sitting(const PosedMembers& posed, const std::string& what,
-                     const std::vector<size_t>& members) {
-  Sitting sitting;
-  sitting.pictures.resize(members.size());
+PictureSet draw_picture_set(const PosedMembers& posed, const std::string& what,
+                            const std::vector<size_t>& members) {
+  PictureSet set;
+  set.pictures.resize(members.size());
   posed.draw(what, members, [&](size_t i, std::vector<Picture> pictures) {
-    sitting.pictures[i] = std::move(pictures);
+    set.pictures[i] = std::move(pictures);
   });
   for (size_t a = 0; a < posed.shots(); ++a) {
     for (size_t b = 0; b < posed.shots(); ++b) {
       if (posed.pose_of(a) != posed.pose_of(b) && posed.view_of(a) != posed.view_of(b))
-        sitting.shot_pairs.emplace_back(a, b);
+        set.shot_pairs.emplace_back(a, b);
     }
   }
-  return sitting;
+  return set;
 }
 
 // Share of the queries whose nearest gallery picture shows the same person. distances: [queries,
@@ -65,11 +65,11 @@ double rank_one(const RowMatrix& distances) {
 // distances(query shot, gallery shot) of everybody to everybody.
 using ShotDistances = std::function<RowMatrix(size_t, size_t)>;
 
-double mean_rank_one(const Sitting& sitting, const Crew& crew, const std::string& what,
+double mean_rank_one(const PictureSet& set, const Crew& crew, const std::string& what,
                      const ShotDistances& distances) {
-  std::vector<double> found(sitting.shot_pairs.size());
+  std::vector<double> found(set.shot_pairs.size());
   crew.run(what, found.size(), [&](size_t i) {
-    found[i] = rank_one(distances(sitting.shot_pairs[i].first, sitting.shot_pairs[i].second));
+    found[i] = rank_one(distances(set.shot_pairs[i].first, set.shot_pairs[i].second));
   });
   double sum = 0;
   for (const double share : found) sum += share;
@@ -87,36 +87,36 @@ RowMatrix all_pairs(size_t members, Pair&& pair) {
   return distances;
 }
 
-double rank_one_of_features(const FeatureNetwork& network, const Sitting& sitting, uint32_t threads,
+double rank_one_of_features(const FeatureNetwork& network, const PictureSet& set, uint32_t threads,
                             const Crew& crew) {
   std::vector<RowMatrix> features;
-  for (size_t shot = 0; shot < sitting.shots(); ++shot)
-    features.push_back(network.features(sitting.shot(shot), threads));
-  return mean_rank_one(sitting, crew, "comparing features", [&](size_t a, size_t b) {
-    return all_pairs(sitting.members(), [&](Eigen::Index i, Eigen::Index j) {
+  for (size_t shot = 0; shot < set.shots(); ++shot)
+    features.push_back(network.features(set.shot(shot), threads));
+  return mean_rank_one(set, crew, "comparing features", [&](size_t a, size_t b) {
+    return all_pairs(set.members(), [&](Eigen::Index i, Eigen::Index j) {
       return (features[a].row(i) - features[b].row(j)).squaredNorm();
     });
   });
 }
 
-double rank_one_of_distances(const PerceptualNetwork& network, const Sitting& sitting,
+double rank_one_of_distances(const PerceptualNetwork& network, const PictureSet& set,
                              uint32_t threads, const Crew& crew) {
   std::vector<std::vector<std::vector<float>>> embeddings;
-  for (size_t shot = 0; shot < sitting.shots(); ++shot)
-    embeddings.push_back(network.embed(sitting.shot(shot), threads));
-  return mean_rank_one(sitting, crew, "comparing activations", [&](size_t a, size_t b) {
-    return all_pairs(sitting.members(), [&](Eigen::Index i, Eigen::Index j) {
+  for (size_t shot = 0; shot < set.shots(); ++shot)
+    embeddings.push_back(network.embed(set.shot(shot), threads));
+  return mean_rank_one(set, crew, "comparing activations", [&](size_t a, size_t b) {
+    return all_pairs(set.members(), [&](Eigen::Index i, Eigen::Index j) {
       return embedding_distance(embeddings[a][static_cast<size_t>(i)],
                                 embeddings[b][static_cast<size_t>(j)]);
     });
   });
 }
 
-double rank_one_of_pixels(const Sitting& sitting, const Crew& crew) {
-  return mean_rank_one(sitting, crew, "comparing pixels", [&](size_t a, size_t b) {
-    return all_pairs(sitting.members(), [&](Eigen::Index i, Eigen::Index j) {
-      return union_error(sitting.pictures[static_cast<size_t>(i)][a],
-                         sitting.pictures[static_cast<size_t>(j)][b])
+double rank_one_of_pixels(const PictureSet& set, const Crew& crew) {
+  return mean_rank_one(set, crew, "comparing pixels", [&](size_t a, size_t b) {
+    return all_pairs(set.members(), [&](Eigen::Index i, Eigen::Index j) {
+      return union_error(set.pictures[static_cast<size_t>(i)][a],
+                         set.pictures[static_cast<size_t>(j)][b])
           .mse();
     });
   });
@@ -133,12 +133,12 @@ double mean_distance(const PerceptualNetwork& network, const RgbPictures& a, con
 }
 
 // What a number of the distance means: between people, between poses, and after blur and noise.
-nlohmann::json scale_of(const PerceptualNetwork& network, const Sitting& sitting,
+nlohmann::json scale_of(const PerceptualNetwork& network, const PictureSet& set,
                         const RetrievalOptions& options) {
-  const RgbPictures pictures = sitting.shot(0);
+  const RgbPictures pictures = set.shot(0);
   const RowMatrix people = network.distances(pictures, pictures, options.threads);
   const double pairs = static_cast<double>(people.rows() * (people.rows() - 1));
-  const RgbPictures posed = sitting.shot(sitting.shot_pairs.front().second);
+  const RgbPictures posed = set.shot(set.shot_pairs.front().second);
   nlohmann::json blur = nlohmann::json::array(), noise = nlohmann::json::array();
   for (const double deviation : kBlurs_px) {
     blur.push_back({{"deviation_px", deviation},
@@ -157,19 +157,19 @@ nlohmann::json scale_of(const PerceptualNetwork& network, const Sitting& sitting
           {"noise", std::move(noise)}};
 }
 
-nlohmann::json measure(const Sitting& sitting, const ComparingNetworks& networks,
+nlohmann::json measure(const PictureSet& set, const ComparingNetworks& networks,
                        const RetrievalOptions& options) {
   const Crew crew(options.threads, options.quiet);
   nlohmann::json features = nlohmann::json::object(), distance = nlohmann::json::object();
   for (const auto& network : networks.features)
-    features[network->name()] = rank_one_of_features(*network, sitting, options.threads, crew);
+    features[network->name()] = rank_one_of_features(*network, set, options.threads, crew);
   for (const auto& network : networks.perceptual) {
-    distance[network->name()] = rank_one_of_distances(*network, sitting, options.threads, crew);
+    distance[network->name()] = rank_one_of_distances(*network, set, options.threads, crew);
   }
-  return {{"members", sitting.members()},
-          {"queries", sitting.members() * sitting.shot_pairs.size()},
-          {"chance", 1 / static_cast<double>(sitting.members())},
-          {"pixels", rank_one_of_pixels(sitting, crew)},
+  return {{"members", set.members()},
+          {"queries", set.members() * set.shot_pairs.size()},
+          {"chance", 1 / static_cast<double>(set.members())},
+          {"pixels", rank_one_of_pixels(set, crew)},
           {"features", std::move(features)},
           {"distance", std::move(distance)}};
 }
@@ -273,7 +273,7 @@ nlohmann::json evaluate_networks(const Package& population, const Package& body,
                             .threads = options.threads,
                             .quiet = options.quiet});
   training.resize(std::min(training.size(), held_out.size()));
-  const Sitting strangers = draw_sitting(posed, "drawing held-out members", held_out);
+  const PictureSet strangers = draw_picture_set(posed, "drawing held-out members", held_out);
   nlohmann::json scales = nlohmann::json::object();
   for (const auto& network : networks.perceptual)
     scales[network->name()] = scale_of(*network, strangers, options);
@@ -283,7 +283,7 @@ nlohmann::json evaluate_networks(const Package& population, const Package& body,
        {{"poses", options.poses}, {"views", options.views}, {"size", posed.picture_px()}}},
       {"held_out", measure(strangers, networks, options)},
       {"training",
-       measure(draw_sitting(posed, "drawing training members", training), networks, options)},
+       measure(draw_picture_set(posed, "drawing training members", training), networks, options)},
       {"scale", std::move(scales)}};
   return report;
 }
