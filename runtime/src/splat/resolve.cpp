@@ -12,12 +12,12 @@ namespace {
 // One row of a tile in which nothing was blended: all rows of all such tiles are alike.
 void resolve_empty_row(const KernelTable& kernels, int32_t width, const float* background,
                        kernels::ResolveFormat format, uint8_t* out) {
-  // Light passes whole, so colours are zero and transmittances one; a row of them is enough.
-  static const kernels::TilePixels empty = [] {
-    kernels::TilePixels pixels{};
-    for (float& transmittance : pixels.transmittance) transmittance = 1;
-    return pixels;
-  }();
+  // Light passes whole: no colour, transmittance one. Only the first row is read.
+  kernels::TilePixels empty;
+  std::fill_n(empty.red, kernels::kTileSize, 0.0f);
+  std::fill_n(empty.green, kernels::kTileSize, 0.0f);
+  std::fill_n(empty.blue, kernels::kTileSize, 0.0f);
+  std::fill_n(empty.transmittance, kernels::kTileSize, 1.0f);
   kernels.resolve_rows({.pixels = &empty,
                         .first_row = 0,
                         .rows = 1,
