@@ -53,17 +53,29 @@ function(figurine_program variable target)
   set(${variable} "${script}" PARENT_SCOPE)
 endfunction()
 
+# Tests run side by side, one a core: OpenMP's and OpenBLAS' threads are one unless a test asks for
+# more, and those that wait sleep. Two that spin for a core that another test has take three times
+# the CPU time.
+set(FIGURINE_TEST_ENVIRONMENT "OMP_NUM_THREADS=1" "OMP_WAIT_POLICY=passive")
+
 # figurine_test(NAME SOURCES... LIBRARIES...): a GoogleTest program, one ctest entry. Running no
 # test is a failure. NOT_EMULATED names the tests (SUITE.NAME) that a cross build leaves out, with
-# the reason beside them.
+# the reason beside them. TENSORS: its files compute with LibTorch's tensors, and are compiled with
+# figurine_model's precompiled header in place of GoogleTest's.
 function(figurine_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LIBRARIES;DEFINITIONS;LABELS;NOT_EMULATED"
+  cmake_parse_arguments(arg "TENSORS" "" "SOURCES;LIBRARIES;DEFINITIONS;LABELS;NOT_EMULATED"
     ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest GTest::gtest_main)
   target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}" "${PROJECT_SOURCE_DIR}/tests")
   target_compile_definitions(${name} PRIVATE FIGURINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     ${arg_DEFINITIONS})
+  target_compile_options(${name} PRIVATE -fPIC)  # as the owners of precompiled headers, not -fPIE
+  if(arg_TENSORS)
+    target_precompile_headers(${name} REUSE_FROM figurine_model)
+  else()
+    target_precompile_headers(${name} REUSE_FROM figurine_test_header)
+  endif()
   set(filter)
   if(CMAKE_CROSSCOMPILING AND arg_NOT_EMULATED)
     list(JOIN arg_NOT_EMULATED ":" names)
@@ -71,8 +83,5 @@ function(figurine_test name)
   endif()
   add_test(NAME ${name} COMMAND ${name} ${filter})
   set_tests_properties(${name} PROPERTIES FAIL_REGULAR_EXPRESSION "Running 0 tests"
-    LABELS "${arg_LABELS}")
-  if(arg_TIMEOUT)
-    set_tests_properties(${name} PROPERTIES TIMEOUT ${arg_TIMEOUT})
-  endif()
+    LABELS "${arg_LABELS}" ENVIRONMENT "${FIGURINE_TEST_ENVIRONMENT}")
 endfunction()

@@ -1,5 +1,7 @@
 #include "toolchain/evaluate/feature_trainer.h"
 
+#include <torch/nn/functional/loss.h>
+#include <torch/nn/functional/normalization.h>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -16,6 +18,7 @@
 #include "toolchain/evaluate/posed_members.h"
 #include "toolchain/evaluate/solo_threads.h"
 #include "toolchain/model/optimiser.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/flat_tensor.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/package_file.h"

@@ -1,10 +1,12 @@
 #include "toolchain/evaluate/figurine_features.h"
 
+#include <torch/nn/functional/normalization.h>
 #include <cmath>
 #include <cstring>
 
 #include "toolchain/error.h"
 #include "toolchain/model/convolution.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/random.h"
 #include "toolchain/train/tensor_file.h"
 

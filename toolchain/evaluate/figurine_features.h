@@ -10,8 +10,6 @@
 // alone.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -20,6 +18,7 @@
 
 #include "toolchain/evaluate/feature_network.h"
 #include "toolchain/evaluate/perceptual_embedding.h"
+#include "toolchain/tensor.h"
 
 namespace figurine::evaluate {
 

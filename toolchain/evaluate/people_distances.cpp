@@ -1,11 +1,10 @@
 #include "toolchain/evaluate/people_distances.h"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 
 #include "figurine/check.h"
 #include "toolchain/evaluate/compared_pictures.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::evaluate {
 

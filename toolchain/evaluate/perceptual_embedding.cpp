@@ -1,6 +1,7 @@
 #include "toolchain/evaluate/perceptual_embedding.h"
 
 #include "figurine/check.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::evaluate {
 

@@ -7,11 +7,10 @@
 // Based on: Zhang et al., 2018, eq. 1, and the authors' code (e under the norm).
 #pragma once
 
-#include <torch/torch.h>
-
 #include <vector>
 
 #include "toolchain/evaluate/feature_network.h"
+#include "toolchain/tensor.h"
 
 namespace figurine::evaluate {
 

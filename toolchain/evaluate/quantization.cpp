@@ -11,6 +11,7 @@
 #include "toolchain/evaluate/pictures.h"
 #include "toolchain/evaluate/pose_sequence.h"
 #include "toolchain/model/fake_quantisation.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/progress.h"

@@ -1,8 +1,8 @@
 #include "toolchain/evaluate/solo_threads.h"
 
-#include <ATen/Parallel.h>
-
 #include <atomic>
+
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::evaluate {
 

@@ -12,6 +12,7 @@
 #include "toolchain/error.h"
 #include "toolchain/evaluate/perceptual_embedding.h"
 #include "toolchain/model/convolution.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::evaluate {
 

@@ -4,6 +4,7 @@
 #include "toolchain/error.h"
 #include "toolchain/evaluate/member_pictures.h"
 #include "toolchain/model/unet.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/progress.h"
 
 namespace figurine::generate {

@@ -6,6 +6,7 @@
 #include "toolchain/error.h"
 #include "toolchain/generate/tensors.h"
 #include "toolchain/model/convolution.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::generate {
 

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/tensor_file.h"
 
 namespace figurine::generate {

@@ -3,11 +3,11 @@
 // parameter's shape that is a view of both.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include "toolchain/tensor.h"
 
 namespace figurine::generate {
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "ports/host/files.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/flat_tensor.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"

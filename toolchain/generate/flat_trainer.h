@@ -9,8 +9,6 @@
 // progress.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -20,6 +18,7 @@
 
 #include "toolchain/generate/process_group.h"
 #include "toolchain/model/optimiser.h"
+#include "toolchain/tensor.h"
 #include "toolchain/train/schedule.h"
 
 namespace figurine::generate {

@@ -16,14 +16,13 @@
 // GLOO_SOCKET_IFNAME.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
 
 #include "toolchain/error.h"
+#include "toolchain/tensor.h"
 
 namespace figurine::generate {
 

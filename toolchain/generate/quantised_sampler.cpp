@@ -6,6 +6,7 @@
 
 #include "figurine/fixed_point_weights.h"
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::generate {
 

@@ -15,6 +15,7 @@
 #include "toolchain/generate/autoencoder.h"
 #include "toolchain/generate/flat_trainer.h"
 #include "toolchain/generate/tensors.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/random.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"

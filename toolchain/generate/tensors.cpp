@@ -1,5 +1,6 @@
 #include "toolchain/generate/tensors.h"
 
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/random.h"
 
 namespace figurine::generate {

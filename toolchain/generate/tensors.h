@@ -2,11 +2,10 @@
 // place.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 
 #include "toolchain/evaluate/weight_space.h"
+#include "toolchain/tensor.h"
 
 namespace figurine::generate {
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::generate {
 

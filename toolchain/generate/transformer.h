@@ -13,8 +13,6 @@
 // (pre-norm blocks).
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -22,6 +20,7 @@
 #include <vector>
 
 #include "toolchain/generate/flat_parameters.h"
+#include "toolchain/tensor.h"
 
 namespace figurine::generate {
 

@@ -7,7 +7,7 @@
 // tensors have no such blocks.
 #pragma once
 
-#include <torch/torch.h>
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::model {
 

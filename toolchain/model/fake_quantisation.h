@@ -13,13 +13,12 @@
 // Gradients Through Stochastic Neurons for Conditional Computation, 2013, section 3.4.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "figurine/fixed_point.h"
+#include "toolchain/tensor.h"
 
 namespace figurine::model {
 

@@ -6,6 +6,7 @@
 
 #include "toolchain/model/parallel.h"
 #include "toolchain/model/ssim.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::model {
 

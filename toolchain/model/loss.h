@@ -5,10 +5,10 @@
 // (0.01) is left out: no pretrained AlexNet can be had from the platform's packages.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <array>
 #include <cstdint>
+
+#include "toolchain/tensor.h"
 
 namespace figurine::model {
 

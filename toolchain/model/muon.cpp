@@ -1,5 +1,7 @@
 #include "toolchain/model/muon.h"
 
+#include "toolchain/tensor_operations.h"
+
 namespace figurine::model {
 
 namespace {

@@ -12,7 +12,7 @@
 // and coefficients).
 #pragma once
 
-#include <torch/torch.h>
+#include "toolchain/tensor.h"
 
 namespace figurine::model {
 

@@ -1,5 +1,10 @@
 #include "toolchain/model/optimiser.h"
 
+#include <ATen/TensorOperators.h>
+#include <ATen/core/grad_mode.h>
+#include <ATen/ops/add.h>
+#include <ATen/ops/zeros.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -50,7 +55,7 @@ bool Optimiser::step(torch::Tensor& weights, const torch::Tensor& gradients, dou
   TORCH_CHECK(weights.is_contiguous() && gradients.is_contiguous(),
               "Optimiser: contiguous tensors");
   if (!all_finite(gradients.const_data_ptr<float>(), gradients.numel())) return false;
-  torch::NoGradGuard no_gradient;
+  at::NoGradGuard no_gradient;
   ++steps;
   for (const ParameterGroup& group : groups_) {
     if (group.matrix_rows > 0) {

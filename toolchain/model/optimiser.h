@@ -7,10 +7,10 @@
 // of Muon's step, so that both share one learning rate).
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <vector>
+
+#include "toolchain/tensor.h"
 
 namespace figurine::model {
 

@@ -1,5 +1,7 @@
 #include "toolchain/model/render.h"
 
+#include "toolchain/tensor_operations.h"
+
 namespace figurine::model {
 
 // Shared by the renderer and the graph's node, so that a backward pass outlives the renderer.

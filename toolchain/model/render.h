@@ -2,10 +2,9 @@
 // (decode, skin, splat; analytic backward).
 #pragma once
 
-#include <torch/torch.h>
-
 #include "toolchain/model/head.h"
 #include "toolchain/model/splatter.h"
+#include "toolchain/tensor.h"
 
 namespace figurine::model {
 

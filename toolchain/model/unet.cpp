@@ -6,6 +6,7 @@
 #include "toolchain/error.h"
 #include "toolchain/model/fake_quantisation.h"
 #include "toolchain/model/unet_plan.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::model {
 

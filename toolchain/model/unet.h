@@ -5,8 +5,6 @@
 // Convolutions run channels-last, in bf16 if asked for (the head stays in float).
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -14,6 +12,7 @@
 
 #include "figurine/network.h"
 #include "toolchain/model/optimiser.h"
+#include "toolchain/tensor.h"
 
 namespace figurine::model {
 

@@ -3,13 +3,12 @@
 // the steps that know nothing of weights. Not for others.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <vector>
 
 #include "figurine/network.h"
 #include "toolchain/model/unet.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::model {
 

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/tensor_file.h"
 

@@ -2,14 +2,13 @@
 // them. Held-out poses are never looked at.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "toolchain/quantize/quantised_network.h"
 #include "toolchain/quantize/range.h"
+#include "toolchain/tensor.h"
 #include "toolchain/train/trained_avatar.h"
 
 namespace figurine::quantize {

@@ -7,6 +7,7 @@
 #include "toolchain/model/fake_quantisation.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/quantize/range.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::quantize {
 

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::train {
 

@@ -3,8 +3,6 @@
 // the golden frame and the parity check all go through here, so they cannot differ.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <array>
 #include <vector>
 
@@ -13,6 +11,7 @@
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/model/render.h"
 #include "toolchain/model/unet.h"
+#include "toolchain/tensor.h"
 #include "toolchain/train/owned_pose.h"
 #include "toolchain/train/settings.h"
 

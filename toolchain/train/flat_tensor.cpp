@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::train {
 

@@ -2,10 +2,9 @@
 // to the bit.
 #pragma once
 
-#include <torch/torch.h>
-
 #include <string>
 
+#include "toolchain/tensor.h"
 #include "toolchain/train/tensor_file.h"
 
 namespace figurine::train {

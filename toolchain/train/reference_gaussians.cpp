@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/sample_feed.h"
 
 namespace figurine::train {

@@ -10,9 +10,8 @@
 // isotropic, so the rotation is the identity).
 #pragma once
 
-#include <torch/torch.h>
-
 #include "toolchain/dataset/dataset.h"
+#include "toolchain/tensor.h"
 #include "toolchain/train/avatar_model.h"
 
 namespace figurine::train {

@@ -16,6 +16,7 @@
 #include "toolchain/error.h"
 #include "toolchain/model/optimiser.h"
 #include "toolchain/model/unet.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::train {
 

@@ -1,6 +1,5 @@
 #include "toolchain/train/threads.h"
 
-#include <ATen/Parallel.h>
 #include <dlfcn.h>
 #include <unistd.h>
 
@@ -8,6 +7,8 @@
 #include <cstdlib>
 
 #include "ports/host/cpus.h"
+
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::train {
 

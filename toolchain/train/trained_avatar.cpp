@@ -1,10 +1,9 @@
 #include "toolchain/train/trained_avatar.h"
 
-#include <ATen/Parallel.h>
-
 #include <filesystem>
 
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 
 namespace figurine::train {

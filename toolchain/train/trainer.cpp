@@ -1,7 +1,5 @@
 #include "toolchain/train/trainer.h"
 
-#include <ATen/Parallel.h>
-
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -11,6 +9,7 @@
 #include "toolchain/model/allocator.h"
 #include "toolchain/model/loss.h"
 #include "toolchain/model/optimiser.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/lanes.h"

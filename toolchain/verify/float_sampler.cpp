@@ -4,6 +4,7 @@
 
 #include "runtime/src/sample/noise.h"
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::verify {
 

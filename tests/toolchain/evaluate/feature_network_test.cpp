@@ -13,6 +13,7 @@
 #include "rectangles.h"
 #include "toolchain/evaluate/figurine_features.h"
 #include "toolchain/evaluate/retrieval.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/tensor_file.h"
 
 namespace figurine::evaluate {

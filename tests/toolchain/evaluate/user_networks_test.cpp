@@ -13,6 +13,7 @@
 #include "people.h"
 #include "rectangles.h"
 #include "toolchain/body/test_files.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::evaluate {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "toolchain/error.h"
 #include "toolchain/generate/tensors.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/threads.h"
 
 namespace figurine::generate {

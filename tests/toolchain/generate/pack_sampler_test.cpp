@@ -20,6 +20,7 @@
 #include "toolchain/error.h"
 #include "toolchain/generate/quantised_sampler.h"
 #include "toolchain/generate/sampler_trainer.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/verify/device_samples.h"
 #include "toolchain/verify/float_sampler.h"
 #include "toolchain/verify/sampling_error.h"

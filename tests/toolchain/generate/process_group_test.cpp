@@ -1,6 +1,7 @@
 // Ranks on this machine: who is who, what they say to each other, and that nobody waits for ever
 // for one that is gone.
 #include "toolchain/generate/process_group.h"
+#include "toolchain/tensor_operations.h"
 
 #include <gtest/gtest.h>
 

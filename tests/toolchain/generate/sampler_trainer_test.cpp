@@ -13,6 +13,7 @@
 #include "ports/host/folder_lock.h"
 #include "tests/toolchain/generate/small_people.h"
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/tensor_file.h"
 #include "toolchain/train/threads.h"

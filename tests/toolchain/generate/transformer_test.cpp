@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::generate {
 namespace {

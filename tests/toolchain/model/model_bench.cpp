@@ -21,6 +21,7 @@
 #include "toolchain/model/splatter.h"
 #include "toolchain/model/ssim.h"
 #include "toolchain/model/unet.h"
+#include "toolchain/tensor_operations.h"
 
 namespace {
 

@@ -1,6 +1,7 @@
 // The trainer's imitation of fixed point against the integers themselves, and its gradients by
 // hand.
 #include "toolchain/model/fake_quantisation.h"
+#include "toolchain/tensor_operations.h"
 
 #include <gtest/gtest.h>
 

@@ -10,6 +10,7 @@
 #include "tests/toolchain/train/small_capture.h"
 #include "toolchain/evaluate/quantization.h"
 #include "toolchain/model/fake_quantisation.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/trainer.h"

@@ -9,6 +9,7 @@
 #include "tests/toolchain/quantize/random_network.h"
 #include "toolchain/error.h"
 #include "toolchain/quantize/range.h"
+#include "toolchain/tensor_operations.h"
 
 namespace figurine::quantize {
 namespace {

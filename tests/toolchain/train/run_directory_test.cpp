@@ -8,6 +8,7 @@
 #include "toolchain/error.h"
 #include "toolchain/model/optimiser.h"
 #include "toolchain/model/unet.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/run_directory.h"
 
 namespace figurine::train {

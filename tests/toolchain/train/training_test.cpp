@@ -10,6 +10,7 @@
 #include "tests/toolchain/train/small_capture.h"
 #include "toolchain/error.h"
 #include "toolchain/evaluate/reconstruction.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/lanes.h"
 #include "toolchain/train/pack_avatar.h"
@@ -49,7 +50,7 @@ std::string error_of(const TrainRequest& request) {
   return "";
 }
 
-constexpr uint64_t kIterations = 400;
+constexpr uint64_t kIterations = 200;
 
 // One run that several tests look at.
 const std::string& trained_run() {
@@ -73,14 +74,15 @@ TEST(Training, BeatsAFlatColourOnHeldOutViewsAndPoses) {
 
 TEST(Training, LowersTheLossFromTheFirstLogRowToTheLast) {
   const std::vector<LogRow> rows = load_log({trained_run()}, kIterations);
-  ASSERT_EQ(rows.size(), 8u);
+  ASSERT_EQ(rows.size(), 4u);
   EXPECT_LT(rows.back().loss, 0.7 * rows.front().loss);
   EXPECT_GT(rows.back().psnr_db, rows.front().psnr_db + 3);
 }
 
 TEST(Training, ResumedAfterAnInterruptEqualsAnUninterruptedRunBitwise) {
   const TemporaryFolder folder;
-  TrainRequest straight = request(folder.path("straight"), 90);
+  TrainRequest straight = request(folder.path("straight"), 30);
+  straight.settings.schedule.ramp_iterations = 20;  // stopped on it, resumed beyond it
   straight.settings.threads = 2;
   straight.settings.views_per_pose = 3;
   straight.settings.background =
@@ -88,34 +90,34 @@ TEST(Training, ResumedAfterAnInterruptEqualsAnUninterruptedRunBitwise) {
   train_avatar(straight);
   TrainRequest broken = straight;
   broken.run = folder.path("broken");
-  broken.stop_after = 37;
+  broken.stop_after = 13;
   EXPECT_THROW(train_avatar(broken), Interrupted);
   EXPECT_EQ(read_run({broken.run}).json.at("status"), "interrupted");
   broken.stop_after = 0;
   broken.resume = true;
   const TrainResult result = train_avatar(broken);
-  EXPECT_EQ(result.state.iteration, 90u);
+  EXPECT_EQ(result.state.iteration, 30u);
   EXPECT_EQ(bytes_of(RunDirectory{broken.run}.weights()),
             bytes_of(RunDirectory{straight.run}.weights()));
 }
 
 TEST(Training, OfSeveralPosesAnIterationGivesTheSameBitsOnOneThreadAndOnTwo) {
   const TemporaryFolder folder;
-  TrainRequest side_by_side = request(folder.path("side_by_side"), 30);
+  TrainRequest side_by_side = request(folder.path("side_by_side"), 10);
   side_by_side.settings.poses_per_iteration = 3;  // one lane takes two of them
   side_by_side.settings.threads = 2;
   train_avatar(side_by_side);
   TrainRequest in_turn = side_by_side;
   in_turn.run = folder.path("in_turn");
   in_turn.settings.threads = 1;
-  in_turn.stop_after = 11;
+  in_turn.stop_after = 4;
   EXPECT_THROW(train_avatar(in_turn), Interrupted);
   in_turn.stop_after = 0;
   in_turn.resume = true;
   train_avatar(in_turn);
   EXPECT_EQ(bytes_of(RunDirectory{in_turn.run}.weights()),
             bytes_of(RunDirectory{side_by_side.run}.weights()));
-  TrainRequest one = request(folder.path("one"), 30);
+  TrainRequest one = request(folder.path("one"), 10);
   train_avatar(one);
   EXPECT_NE(bytes_of(RunDirectory{one.run}.weights()),
             bytes_of(RunDirectory{side_by_side.run}.weights()));
@@ -128,7 +130,7 @@ TEST(Training, WithStandoffGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
   TensorFile weights = read_tensor_file(RunDirectory{trained_run()}.weights());
   weights.tensors.at("layer.14.bias").values.at(0) += 2;
   write_tensor_file(folder.path("beside.safetensors"), weights);
-  TrainRequest off = request(folder.path("off"), 30);
+  TrainRequest off = request(folder.path("off"), 12);
   off.settings.init = folder.path("beside.safetensors");
   off.settings.poses_per_iteration = 2;
   off.settings.standoff_weight = 0;
@@ -140,7 +142,7 @@ TEST(Training, WithStandoffGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
   TrainRequest two = one;
   two.run = folder.path("two");
   two.settings.threads = 2;
-  two.stop_after = 11;  // while it pulls
+  two.stop_after = 5;  // while it pulls
   EXPECT_THROW(train_avatar(two), Interrupted);
   two.stop_after = 0;
   two.resume = true;

@@ -1,0 +1,1 @@
+// Owner of the precompiled header of the test programs (CMakeLists.txt): a library needs a source.
