@@ -81,8 +81,9 @@ TEST(Training, LowersTheLossFromTheFirstLogRowToTheLast) {
 
 TEST(Training, ResumedAfterAnInterruptEqualsAnUninterruptedRunBitwise) {
   const TemporaryFolder folder;
-  TrainRequest straight = request(folder.path("straight"), 30);
-  straight.settings.schedule.ramp_iterations = 20;  // stopped on it, resumed beyond it
+  TrainRequest straight = request(folder.path("straight"), 56);
+  // Stopped on the ramp and before the first row of the log, at 50; resumed beyond both.
+  straight.settings.schedule.ramp_iterations = 45;
   straight.settings.threads = 2;
   straight.settings.views_per_pose = 3;
   straight.settings.background =
@@ -90,13 +91,16 @@ TEST(Training, ResumedAfterAnInterruptEqualsAnUninterruptedRunBitwise) {
   train_avatar(straight);
   TrainRequest broken = straight;
   broken.run = folder.path("broken");
-  broken.stop_after = 13;
+  broken.stop_after = 37;
   EXPECT_THROW(train_avatar(broken), Interrupted);
   EXPECT_EQ(read_run({broken.run}).json.at("status"), "interrupted");
   broken.stop_after = 0;
   broken.resume = true;
   const TrainResult result = train_avatar(broken);
-  EXPECT_EQ(result.state.iteration, 30u);
+  EXPECT_EQ(result.state.iteration, 56u);
+  const std::vector<LogRow> rows = load_log({broken.run}, 56), truth = load_log({straight.run}, 56);
+  ASSERT_EQ(rows.size(), truth.size());
+  for (size_t i = 0; i < rows.size(); ++i) EXPECT_EQ(rows[i].loss, truth[i].loss) << "row " << i;
   EXPECT_EQ(bytes_of(RunDirectory{broken.run}.weights()),
             bytes_of(RunDirectory{straight.run}.weights()));
 }
