@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 
 namespace figurine {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 
 namespace figurine {
 

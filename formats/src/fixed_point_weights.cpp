@@ -1,11 +1,11 @@
-#include "figurine/fixed_point_weights.h"
+#include "figurine/detail/fixed_point_weights.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 
 namespace figurine {
 

@@ -1,10 +1,10 @@
-#include "figurine/noise_level.h"
+#include "figurine/detail/noise_level.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 
 namespace figurine {
 

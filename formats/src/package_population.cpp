@@ -6,7 +6,7 @@
 #include <limits>
 #include <set>
 
-#include "figurine/rans.h"
+#include "figurine/detail/rans.h"
 #include "formats/src/package_content.h"
 #include "formats/src/package_text.h"
 

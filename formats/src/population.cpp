@@ -3,7 +3,7 @@
 #include <charconv>
 
 #include "figurine/check.h"
-#include "figurine/rans.h"
+#include "figurine/detail/rans.h"
 
 namespace figurine {
 

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "figurine/rans.h"
+#include "figurine/detail/rans.h"
 
 namespace figurine {
 

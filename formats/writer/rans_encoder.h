@@ -1,4 +1,4 @@
-// The other side of figurine/rans.h.
+// The other side of figurine/detail/rans.h.
 #pragma once
 
 #include <array>
@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "figurine/rans.h"
+#include "figurine/detail/rans.h"
 
 namespace figurine {
 

@@ -1,6 +1,6 @@
 // The project's own exp, expm1, log, sine and cosine in double against libm in long double, over
 // dense samples of their domains.
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Noise levels: alpha and sigma against long double, where the levels lie, and what the copied
 // schedule ends at.
-#include "figurine/noise_level.h"
+#include "figurine/detail/noise_level.h"
 
 #include <gtest/gtest.h>
 

@@ -10,8 +10,8 @@
 #include <functional>
 #include <limits>
 
-#include "figurine/half.h"
-#include "figurine/rans.h"
+#include "figurine/detail/half.h"
+#include "figurine/detail/rans.h"
 #include "formats/opened.h"
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "figurine/check.h"
-#include "figurine/philox.h"
+#include "figurine/detail/philox.h"
 
 namespace figurine::evaluate {
 

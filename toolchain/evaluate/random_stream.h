@@ -1,5 +1,5 @@
 // Random choices of the statistics of samples: functions of (seed, what they are for, item,
-// counter), so nothing depends on how much is drawn or in which order (figurine/philox.h).
+// counter), so nothing depends on how much is drawn or in which order (figurine/detail/philox.h).
 #pragma once
 
 #include <cstddef>

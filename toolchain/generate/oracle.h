@@ -7,7 +7,7 @@
 
 #include <Eigen/Dense>
 
-#include "figurine/noise_level.h"
+#include "figurine/detail/noise_level.h"
 
 namespace figurine::generate {
 

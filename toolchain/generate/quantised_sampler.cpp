@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "figurine/fixed_point_weights.h"
+#include "figurine/detail/fixed_point_weights.h"
 #include "toolchain/error.h"
 #include "toolchain/tensor_operations.h"
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "figurine/noise_level.h"
+#include "figurine/detail/noise_level.h"
 #include "toolchain/generate/model_space.h"
 #include "toolchain/generate/transformer.h"
 #include "toolchain/train/schedule.h"
@@ -43,7 +43,7 @@ struct SamplerSettings {
   TransformerShape shape;            // token_sizes follow from the space
   uint32_t members = 0;              // the first so many training members; 0: all
   double clean_snr = 1e4;            // where sampling ends: 40 dB, below the rounding of int8
-  double noisy_dimension_snr = 0.1;  // D x SNR where it begins (figurine/noise_level.h)
+  double noisy_dimension_snr = 0.1;  // D x SNR where it begins (figurine/detail/noise_level.h)
   uint32_t batch = 32;
   double ema = 0.999;  // decay of the moving average of the weights, which is what is kept
   uint64_t seed = 1;

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <optional>
 
-#include "figurine/noise_level.h"
+#include "figurine/detail/noise_level.h"
 #include "ports/host/folder_lock.h"
 #include "toolchain/error.h"
 #include "toolchain/generate/autoencoder.h"

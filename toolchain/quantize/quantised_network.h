@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "figurine/detail/fixed_point_weights.h"
 #include "figurine/fixed_point.h"
-#include "figurine/fixed_point_weights.h"
 #include "figurine/network.h"
 
 namespace figurine::model {

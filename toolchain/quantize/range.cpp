@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "figurine/check.h"
-#include "figurine/fixed_point_weights.h"
+#include "figurine/detail/fixed_point_weights.h"
 
 namespace figurine::quantize {
 

@@ -51,7 +51,7 @@ class Histogram {
 Quantisation quantisation_of(const Range& range);
 
 // The scale with the smallest squared error, at most max_abs_scale
-// (figurine/fixed_point_weights.h). 0 if all weights are zero.
+// (figurine/detail/fixed_point_weights.h). 0 if all weights are zero.
 float smallest_error_scale(std::span<const float> weights);
 
 }  // namespace figurine::quantize

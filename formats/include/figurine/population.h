@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "figurine/avatar.h"
-#include "figurine/half.h"
+#include "figurine/detail/half.h"
 
 namespace figurine {
 
@@ -63,7 +63,7 @@ struct Population {
   std::span<const float> bias;   // [M,R]
   std::span<const float> scale;  // [M,R] of kInt8
   std::span<const int16_t>
-      frequency;  // [C,255] of q in a convolution of any member, in units of 2^-14 (rans.h)
+      frequency;                  // [C,255] of q in a convolution of any member, in units of 2^-14
   std::span<const uint8_t> code;  // the members' streams of q, one after the other: W values each
   std::span<const uint32_t> code_end;   // [M] where a member's stream ends
   std::span<const Half> difference;     // [M,W] of kHalf

@@ -26,7 +26,7 @@
 #include <vector>
 
 #include "figurine/avatar.h"
-#include "figurine/noise_level.h"
+#include "figurine/detail/noise_level.h"
 
 namespace figurine {
 

@@ -15,7 +15,7 @@
 #include <optional>
 #include <vector>
 
-#include "figurine/fixed_point_weights.h"
+#include "figurine/detail/fixed_point_weights.h"
 #include "figurine/sampler.h"
 #include "figurine/status.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 #include "runtime/src/base/memory.h"
 #include "runtime/src/sample/device_transformer.h"
 #include "runtime/src/sample/noise.h"

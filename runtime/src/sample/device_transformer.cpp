@@ -4,7 +4,7 @@
 #include <cmath>
 #include <new>
 
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 #include "runtime/src/base/float_math.h"
 
 namespace figurine {

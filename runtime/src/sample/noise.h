@@ -1,11 +1,11 @@
 // Normal random numbers that are the same to the bit on every CPU, in any order and in any cut:
-// value i depends on (seed, stream, i) alone (figurine/philox.h).
+// value i depends on (seed, stream, i) alone (figurine/detail/philox.h).
 #pragma once
 
 #include <cstdint>
 #include <span>
 
-#include "figurine/philox.h"
+#include "figurine/detail/philox.h"
 
 namespace figurine {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 
 namespace figurine {
 

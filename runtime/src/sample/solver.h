@@ -4,14 +4,14 @@
 // DDIM: Song, Meng and Ermon, Denoising Diffusion Implicit Models, 2021, eta = 0; the first order.
 // DPM-Solver++(2M): Lu et al., DPM-Solver++, 2022, algorithm 2; the second order, from this
 // prediction and the one before. The equations are in docs/numerics.md, "Sampling". No allocation,
-// no randomness: the caller draws the start (noise.h), places the levels (figurine/noise_level.h)
+// no randomness: the caller draws the start (noise.h), places the levels (noise_level.h)
 // and lends the storage.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
-#include "figurine/noise_level.h"
+#include "figurine/detail/noise_level.h"
 #include "figurine/sampler.h"
 #include "figurine/status.h"
 

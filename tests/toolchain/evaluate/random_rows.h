@@ -1,7 +1,7 @@
 // Matrices of standard normal values that are the same on every machine.
 #pragma once
 
-#include "figurine/philox.h"
+#include "figurine/detail/philox.h"
 #include "toolchain/evaluate/weight_space.h"
 
 namespace figurine::tests {

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "figurine/philox.h"
+#include "figurine/detail/philox.h"
 
 namespace figurine::evaluate {
 namespace {

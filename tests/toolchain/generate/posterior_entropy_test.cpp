@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "figurine/noise_level.h"
+#include "figurine/detail/noise_level.h"
 #include "tests/toolchain/generate/normal_rows.h"
 
 namespace figurine::verify {

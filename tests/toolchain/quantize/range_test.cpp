@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "figurine/fixed_point_weights.h"
+#include "figurine/detail/fixed_point_weights.h"
 
 namespace figurine::quantize {
 namespace {

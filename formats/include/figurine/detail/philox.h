@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "figurine/double_math.h"
+#include "figurine/detail/double_math.h"
 
 namespace figurine {
 
