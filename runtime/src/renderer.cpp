@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <new>
 #include <string>
 #include <utility>
@@ -42,18 +43,13 @@ Status validate_gaussians(const GaussianView& gaussians, size_t index) {
 const char* network_library() { return "XNNPACK " FIGURINE_XNNPACK_VERSION; }
 
 struct Renderer::Impl {
-  Impl(ThreadPool&& threads, const RendererOptions& options, const KernelTable& table)
-      : pool(std::move(threads)), now_ns(options.now_ns), kernels(table), rasterizer(pool, table) {}
-
-  // Fails, or says how many blocks of Gaussians the frame has at most.
-  Status validate(const Frame& frame, const ImageTarget& target, uint32_t& blocks) const;
-  Status validate_avatar(AvatarId id, const PoseView& pose) const;
-  Result<const BodyBlocks*> blocks_of(const Body& body);
-  Status add(const FrameAvatar& seen, const kernels::View& view, const LeaveOut& leave_out,
-             StageClock& clock, FrameStatistics& statistics);
-
-  PosedAvatar& avatar(AvatarId id) { return *avatars[static_cast<size_t>(id)].posed; }
-  const PosedAvatar& avatar(AvatarId id) const { return *avatars[static_cast<size_t>(id)].posed; }
+  Impl(std::shared_ptr<ThreadPool> threads, const RendererOptions& options,
+       const KernelTable& table)
+      : pool(std::move(threads)),
+        now_ns(options.now_ns),
+        now_user(options.now_user),
+        kernels(table),
+        rasterizer(*pool, table) {}
 
   struct SharedBody {
     const uint32_t* texel;  // where the body's arrays lie tells bodies apart
@@ -61,15 +57,28 @@ struct Renderer::Impl {
   };
   // One is posed and projected before the next, so equal ones are one.
   struct AddedAvatar {
+    AvatarId id;
     AvatarIdentity identity;
+    std::shared_ptr<SharedBody> body;  // in front of what borrows from it
     std::shared_ptr<PosedAvatar> posed;
   };
 
-  ThreadPool pool;
-  uint64_t (*now_ns)();
+  // Fails, or says how many blocks of Gaussians the frame has at most.
+  Status validate(const Frame& frame, const ImageTarget& target, uint32_t& blocks) const;
+  Status validate_avatar(AvatarId id, const PoseView& pose) const;
+  Result<std::shared_ptr<SharedBody>> blocks_of(const Body& body) const;
+  Status add(const FrameAvatar& seen, const kernels::View& view, const LeaveOut& leave_out,
+             StageClock& clock, FrameStatistics& statistics);
+
+  std::vector<AddedAvatar>::const_iterator find(AvatarId id) const;  // end() if there is none
+  PosedAvatar& avatar(AvatarId id) const { return *find(id)->posed; }
+
+  std::shared_ptr<ThreadPool> pool;
+  uint64_t (*now_ns)(void* user);
+  void* now_user;
   const KernelTable& kernels;
-  std::vector<std::unique_ptr<SharedBody>> bodies;
-  std::vector<AddedAvatar> avatars;  // by AvatarId
+  std::vector<AddedAvatar> avatars;  // ids ascending
+  uint32_t next_id = 0;
   PoseScratch scratch;
   GaussianArrays gaussians;  // of pose_avatar()
   Rasterizer rasterizer;
@@ -113,18 +122,25 @@ Status Renderer::Impl::validate(const Frame& frame, const ImageTarget& target,
 }
 
 Status Renderer::Impl::validate_avatar(AvatarId id, const PoseView& pose) const {
-  if (static_cast<size_t>(id) >= avatars.size()) return invalid("no avatar of this id was added");
+  if (find(id) == avatars.end()) return invalid("there is no avatar of this id");
   return validate_pose(pose, avatar(id).body().joint_count());
 }
 
-Result<const BodyBlocks*> Renderer::Impl::blocks_of(const Body& body) {
-  for (const std::unique_ptr<SharedBody>& shared : bodies) {
-    if (shared->texel == body.texel.data()) return &shared->blocks;
+std::vector<Renderer::Impl::AddedAvatar>::const_iterator Renderer::Impl::find(AvatarId id) const {
+  const auto place =
+      std::lower_bound(avatars.begin(), avatars.end(), id,
+                       [](const AddedAvatar& added, AvatarId wanted) { return added.id < wanted; });
+  return place != avatars.end() && place->id == id ? place : avatars.end();
+}
+
+Result<std::shared_ptr<Renderer::Impl::SharedBody>> Renderer::Impl::blocks_of(
+    const Body& body) const {
+  for (const AddedAvatar& added : avatars) {
+    if (added.body->texel == body.texel.data()) return added.body;
   }
-  std::unique_ptr<SharedBody> shared(new (std::nothrow) SharedBody{body.texel.data(), {}});
+  std::shared_ptr<SharedBody> shared(new (std::nothrow) SharedBody{body.texel.data(), {}});
   if (shared == nullptr || !shared->blocks.ensure(body)) return out_of_memory("a body's texels");
-  bodies.push_back(std::move(shared));
-  return &bodies.back()->blocks;
+  return shared;
 }
 
 Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view,
@@ -155,12 +171,14 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
   const Result<const KernelTable*> kernels =
       kernels_for(options.isa.value_or(supported_isas().back()));
   if (!kernels.ok()) return kernels.status();
-  uint32_t threads = options.threads;
-  if (threads <= ThreadPool::kMaxThreads && !options.allow_oversubscription)
-    threads = std::min(threads, allowed_cpus());
-  Result<ThreadPool> pool = ThreadPool::create(threads);
-  if (!pool.ok()) return pool.status();
-  std::unique_ptr<Impl> impl(new (std::nothrow) Impl(std::move(pool).value(), options, **kernels));
+  std::shared_ptr<ThreadPool> pool = options.pool;
+  if (pool == nullptr) {
+    Result<std::shared_ptr<ThreadPool>> own = make_thread_pool(
+        {.threads = options.threads, .allow_oversubscription = options.allow_oversubscription});
+    if (!own.ok()) return own.status();
+    pool = std::move(own).value();
+  }
+  std::unique_ptr<Impl> impl(new (std::nothrow) Impl(std::move(pool), options, **kernels));
   if (impl == nullptr) return out_of_memory("a renderer");
   std::unique_ptr<Renderer> renderer(new (std::nothrow) Renderer(std::move(impl)));
   if (renderer == nullptr) return out_of_memory("a renderer");
@@ -181,30 +199,43 @@ Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
     return Status(StatusCode::kMismatch,
                   std::string("a body is wanted, not a ") + to_string(body.kind()));
   FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar, body));
-  const Result<const BodyBlocks*> blocks = impl_->blocks_of(body.body());
-  if (!blocks.ok()) return blocks.status();
+  if (impl_->next_id == std::numeric_limits<uint32_t>::max())
+    return Status(StatusCode::kLimitExceeded, "avatars: no further id");
+  const Result<std::shared_ptr<Impl::SharedBody>> shared = impl_->blocks_of(body.body());
+  if (!shared.ok()) return shared.status();
+  const BodyBlocks& blocks = (*shared)->blocks;
   const Precision held =
       avatar.holds(Precision::kFixedPoint) ? Precision::kFixedPoint : Precision::kFloat32;
-  Impl::AddedAvatar added{identify(avatar, body.body(), precision.value_or(held)), nullptr};
+  Impl::AddedAvatar added{.id = AvatarId(impl_->next_id),
+                          .identity = identify(avatar, body.body(), precision.value_or(held)),
+                          .body = *shared,
+                          .posed = nullptr};
   for (const Impl::AddedAvatar& other : impl_->avatars) {
     if (other.identity == added.identity) added.posed = other.posed;
   }
   if (added.posed == nullptr) {
     Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(
-        avatar, body.body(), **blocks, precision.value_or(held), impl_->pool, impl_->kernels);
+        avatar, body.body(), blocks, precision.value_or(held), *impl_->pool, impl_->kernels);
     if (!posed.ok()) return posed.status();
     added.posed = std::move(posed).value();
   }
-  if (!impl_->scratch.ensure(body.body().joint_count(), (*blocks)->count()))
+  if (!impl_->scratch.ensure(body.body().joint_count(), blocks.count()))
     return out_of_memory("an avatar's pose");
   impl_->avatars.push_back(std::move(added));
-  return AvatarId(impl_->avatars.size() - 1);
+  return AvatarId(impl_->next_id++);
 }
 
-uint32_t Renderer::threads() const { return impl_->pool.threads(); }
+Status Renderer::remove_avatar(AvatarId avatar) {
+  const auto added = impl_->find(avatar);
+  if (added == impl_->avatars.end()) return invalid("there is no avatar of this id");
+  impl_->avatars.erase(added);
+  return {};
+}
+
+uint32_t Renderer::threads() const { return impl_->pool->threads(); }
 
 Precision Renderer::precision(AvatarId avatar) const {
-  FIG_CHECK(static_cast<size_t>(avatar) < impl_->avatars.size(), "an avatar that was added");
+  FIG_CHECK(impl_->find(avatar) != impl_->avatars.end(), "an avatar that is there");
   return impl_->avatar(avatar).precision();
 }
 
@@ -215,7 +246,7 @@ Status Renderer::render(const Frame& frame, const ImageTarget& target) {
   const kernels::View view = make_view(frame.camera, frame.splat.alpha_cut);
   FIG_RETURN_IF_ERROR(impl.rasterizer.begin(view, frame.leave_out, blocks));
 
-  StageClock clock(impl.now_ns);
+  StageClock clock(impl.now_ns, impl.now_user);
   FrameStatistics statistics;
   for (const FrameAvatar& seen : frame.avatars) {
     FIG_RETURN_IF_ERROR(impl.add(seen, view, frame.leave_out, clock, statistics));
@@ -235,7 +266,7 @@ Result<GaussianView> Renderer::pose_avatar(AvatarId id, const PoseView& pose) {
   const uint32_t count = posed.body().texel_count();
   if (!impl_->gaussians.ensure(count, posed.sh_degree()))
     return out_of_memory("an avatar's Gaussians");
-  StageClock clock(nullptr);
+  StageClock clock;
   FIG_RETURN_IF_ERROR(posed.pose(pose, nullptr, {}, impl_->scratch, clock));
   kernels::GaussianBlock block;
   for (uint32_t i = 0; i < posed.block_count(); ++i) {
@@ -252,12 +283,14 @@ const FrameStatistics& Renderer::statistics() const { return impl_->statistics; 
 uint64_t Renderer::memory_bytes() const {
   uint64_t bytes = impl_->rasterizer.memory_bytes() + impl_->gaussians.memory_bytes() +
                    impl_->scratch.memory_bytes();
-  for (const std::unique_ptr<Impl::SharedBody>& body : impl_->bodies)
-    bytes += body->blocks.memory_bytes();
   for (auto added = impl_->avatars.begin(); added != impl_->avatars.end(); ++added) {
-    const bool shared = std::any_of(impl_->avatars.begin(), added,
-                                    [&](const auto& other) { return other.posed == added->posed; });
-    if (!shared) bytes += added->posed->memory_bytes();
+    const auto counted = [&](const auto& is_same) {
+      return std::any_of(impl_->avatars.begin(), added, is_same);
+    };
+    if (!counted([&](const auto& other) { return other.body == added->body; }))
+      bytes += added->body->blocks.memory_bytes();
+    if (!counted([&](const auto& other) { return other.posed == added->posed; }))
+      bytes += added->posed->memory_bytes();
   }
   return bytes;
 }

@@ -52,7 +52,7 @@ Result<RendererOptions> DeviceOptions::renderer_options() const {
   }
   return RendererOptions{.threads = force_threads ? wanted : std::min(wanted, cpus),
                          .allow_oversubscription = force_threads,
-                         .now_ns = ports::now_ns,
+                         .now_ns = [](void*) { return ports::now_ns(); },
                          .isa = *kernels};
 }
 

@@ -339,6 +339,21 @@ TEST_F(AvatarSamplerTest, ASeedIsOneAvatarAndAnotherIsAnother) {
   EXPECT_NE(first, hash_of({.seed = 1, .method = SolverMethod::kDdim}));
 }
 
+TEST_F(AvatarSamplerTest, AnInstructionSetIsChosenOrRefused) {
+  const auto expected = hash_of({.seed = 1});
+  for (const Isa isa : {Isa::kBaseline, Isa::kNeon, Isa::kSse41, Isa::kAvx2, Isa::kAvx512}) {
+    const std::span<const Isa> supported = supported_isas();
+    auto created = AvatarSampler::create(random_.view, isa);
+    if (std::find(supported.begin(), supported.end(), isa) == supported.end()) {
+      EXPECT_EQ(created.status().code(), StatusCode::kUnsupported) << to_string(isa);
+      continue;
+    }
+    ASSERT_TRUE(created.ok()) << created.status().message();
+    sampler_ = std::move(*created);
+    EXPECT_EQ(hash_of({.seed = 1}), expected) << to_string(isa);
+  }
+}
+
 TEST_F(AvatarSamplerTest, ZeroStepsAndNoMethodAreThePackages) {
   EXPECT_EQ(hash_of({.seed = 1}),
             hash_of({.seed = 1, .steps = 20, .method = SolverMethod::kDpmSolverPlusPlus2M}));

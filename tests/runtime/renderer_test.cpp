@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -491,20 +492,108 @@ TEST(Renderer, UnsoundInputIsRefusedAndNothingIsDrawn) {
   refuse("SH degree 4", frame, target);
 }
 
+TEST(Renderer, RemovesAnAvatarAndRefusesItsIdForEver) {
+  const SyntheticBody body = make_test_body();
+  const SyntheticAvatar first = make_test_avatar(body, {.seed = 1}),
+                        second = make_test_avatar(body, {.seed = 2});
+  const SyntheticPose pose = make_test_pose(body.body(), 1);
+  const std::unique_ptr<Renderer> renderer = make_renderer();
+  const auto picture_of = [&](AvatarId id) {
+    const FrameAvatar seen[] = {{.avatar = id, .pose = pose.view()}};
+    return render_bytes(*renderer, {.camera = make_test_camera(48, 48), .avatars = seen});
+  };
+  const AvatarId one = add(*renderer, first, body), two = add(*renderer, second, body);
+  const std::vector<uint8_t> of_one = picture_of(one), of_two = picture_of(two);
+  const uint64_t both_bytes = renderer->memory_bytes();
+
+  EXPECT_TRUE(renderer->remove_avatar(one).ok());
+  EXPECT_LT(renderer->memory_bytes(), both_bytes);
+  EXPECT_EQ(renderer->remove_avatar(one).code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(renderer->pose_avatar(one, pose.view()).status().code(), StatusCode::kInvalidArgument);
+  EXPECT_DEATH(static_cast<void>(renderer->precision(one)), "an avatar that is there");
+  EXPECT_EQ(picture_of(two), of_two) << "keeps its id";
+
+  const AvatarId again = add(*renderer, first, body);
+  EXPECT_NE(again, one);
+  EXPECT_NE(again, two);
+  EXPECT_EQ(picture_of(again), of_one);
+  EXPECT_EQ(renderer->memory_bytes(), both_bytes);
+}
+
+// A body's shared texels are found by where its arrays lie: another body at the same place, after
+// the first was given back, is another.
+TEST(Renderer, ForgetsABodyWithItsLastAvatar) {
+  const std::unique_ptr<Renderer> renderer = make_renderer();
+  std::vector<std::byte> place(1 << 20);
+  const size_t shift = (64 - reinterpret_cast<uintptr_t>(place.data()) % 64) % 64;
+  for (const uint64_t seed : {1u, 2u}) {
+    const SyntheticBody original = make_test_body({.seed = seed});
+    const SyntheticAvatar avatar = make_test_avatar(original);
+    const std::span<const std::byte> bytes = original.bytes.bytes();
+    ASSERT_LE(bytes.size() + shift, place.size());
+    std::memcpy(place.data() + shift, bytes.data(), bytes.size());
+    const Result<Package> body = Package::open({place.data() + shift, bytes.size()}, "body");
+    ASSERT_TRUE(body.ok()) << body.status().message();
+
+    const SyntheticPose pose = make_test_pose(original.body(), 1);
+    const Result<AvatarId> id = renderer->add_avatar(*avatar.package, *body);
+    ASSERT_TRUE(id.ok()) << id.status().message();
+    const FrameAvatar moved[] = {{.avatar = *id, .pose = pose.view()}};
+    const std::unique_ptr<Renderer> fresh = make_renderer();
+    const FrameAvatar kept[] = {{.avatar = add(*fresh, avatar, original), .pose = pose.view()}};
+    EXPECT_EQ(render_bytes(*renderer, {.camera = make_test_camera(48, 48), .avatars = moved}),
+              render_bytes(*fresh, {.camera = make_test_camera(48, 48), .avatars = kept}));
+    EXPECT_TRUE(renderer->remove_avatar(*id).ok());
+  }
+}
+
+TEST(Renderer, TwoShareAPoolOnTwoThreads) {
+  const SyntheticBody body = make_test_body();
+  const SyntheticAvatar avatar = make_test_avatar(body);
+  const SyntheticPose pose = make_test_pose(body.body(), 1);
+  const auto picture_of = [&](Renderer& renderer) {
+    const FrameAvatar seen[] = {{.avatar = add(renderer, avatar, body), .pose = pose.view()}};
+    std::vector<uint8_t> last;
+    for (int frame = 0; frame < 20; ++frame) {
+      last = render_bytes(renderer, {.camera = make_test_camera(48, 48), .avatars = seen});
+    }
+    return last;
+  };
+  std::vector<uint8_t> pictures[2];
+  {
+    Result<std::shared_ptr<ThreadPool>> pool =
+        make_thread_pool({.threads = 3, .allow_oversubscription = true});
+    ASSERT_TRUE(pool.ok()) << pool.status().message();
+    std::unique_ptr<Renderer> renderers[2];
+    for (std::unique_ptr<Renderer>& renderer : renderers) {
+      Result<std::unique_ptr<Renderer>> created = Renderer::create({.pool = *pool});
+      ASSERT_TRUE(created.ok()) << created.status().message();
+      renderer = std::move(*created);
+      EXPECT_EQ(renderer->threads(), thread_count(**pool));
+    }
+    *pool = nullptr;  // the renderers hold it
+    std::thread other([&] { pictures[1] = picture_of(*renderers[1]); });
+    pictures[0] = picture_of(*renderers[0]);
+    other.join();
+  }
+  EXPECT_EQ(pictures[0], picture_of(*make_renderer()));
+  EXPECT_EQ(pictures[1], pictures[0]);
+  EXPECT_EQ(make_thread_pool({.threads = 0}).status().code(), StatusCode::kInvalidArgument);
+}
+
 TEST(Renderer, RefusesNoThreads) {
   EXPECT_EQ(Renderer::create({.threads = 0}).status().code(), StatusCode::kInvalidArgument);
   EXPECT_EQ(Renderer::create({.threads = 65}).status().code(), StatusCode::kInvalidArgument);
 }
 
-uint64_t tick() {
-  static uint64_t now = 0;
-  return now += 1000;
-}
+uint64_t tick(void* now) { return *static_cast<uint64_t*>(now) += 1000; }
 
 TEST(Renderer, StatisticsCountWhatWasDrawn) {
+  uint64_t now = 0;
   const SyntheticBody body = make_test_body();
   const SyntheticAvatar avatar = make_test_avatar(body);
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1, .now_ns = tick});
+  Result<std::unique_ptr<Renderer>> renderer =
+      Renderer::create({.threads = 1, .now_ns = tick, .now_user = &now});
   ASSERT_TRUE(renderer.ok());
   const SyntheticPose pose = make_test_pose(body.body(), 1);
   const FrameAvatar seen[] = {{.avatar = add(**renderer, avatar, body), .pose = pose.view()}};

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "figurine/detail/fixed_point_weights.h"
+#include "figurine/isa.h"
 #include "figurine/sampler.h"
 #include "figurine/status.h"
 
@@ -55,8 +56,10 @@ class AvatarSampler {
     virtual Status after_step(uint32_t step, double lambda, const SampledAvatar& avatar) = 0;
   };
 
-  // kOutOfMemory.
-  static Result<std::unique_ptr<AvatarSampler>> create(const Sampler& sampler);
+  // isa: which kernels run, the same bits with every one; none: the largest set of
+  // supported_isas(). kUnsupported for an instruction set that is not there, kOutOfMemory.
+  static Result<std::unique_ptr<AvatarSampler>> create(const Sampler& sampler,
+                                                       std::optional<Isa> isa = std::nullopt);
   ~AvatarSampler();
   AvatarSampler(const AvatarSampler&) = delete;
   AvatarSampler& operator=(const AvatarSampler&) = delete;

@@ -8,8 +8,8 @@
 //   width, .format = PixelFormat::kRgba8});
 //
 // A frame takes any number of avatars and static Gaussians, sorted together by view depth. Packages
-// are borrowed: their bytes must outlive the renderer. A Renderer is used by one thread at a time;
-// it spreads its own work over its pool.
+// are borrowed: their bytes must outlive their avatars here (remove_avatar). A Renderer is used by
+// one thread at a time; it spreads its own work over its pool.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +20,7 @@
 #include "figurine/isa.h"
 #include "figurine/package.h"
 #include "figurine/status.h"
+#include "figurine/threads.h"
 
 namespace figurine {
 
@@ -28,8 +29,13 @@ struct RendererOptions {
   // on, and fewer where the system gives no more: threads() says how many.
   uint32_t threads = 1;
   bool allow_oversubscription = false;  // more threads than CPUs: slower, for tests and experiments
-  // The runtime has no clock of its own: with one, render() fills stage_ns.
-  uint64_t (*now_ns)() = nullptr;
+  // Threads that others use as well (figurine/threads.h), in place of own ones: the two fields
+  // above are not looked at then.
+  std::shared_ptr<ThreadPool> pool;
+  // The runtime has no clock of its own: with one, render() fills stage_ns. Nanoseconds from any
+  // start; called by all threads of the pool, with now_user.
+  uint64_t (*now_ns)(void* user) = nullptr;
+  void* now_user = nullptr;
   // Which kernels run: the same pixels with every one. None: the largest set of supported_isas().
   std::optional<Isa> isa;
 };
@@ -58,6 +64,10 @@ class Renderer {
   // arrays are borrowed likewise; their meaning must have been verified, as open_member's is.
   Result<AvatarId> add_avatar(const Avatar& avatar, const Package& body,
                               std::optional<Precision> precision = std::nullopt);
+  // Gives back what the avatar alone took; after that nothing of it, nor of its body unless another
+  // avatar stands on that, is borrowed any more. Its id is refused from then on and never given to
+  // another avatar. kInvalidArgument if there is no avatar of this id.
+  Status remove_avatar(AvatarId avatar);
   uint32_t threads() const;                    // that frames are drawn with
   Precision precision(AvatarId avatar) const;  // of an avatar that was added
 

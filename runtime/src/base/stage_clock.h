@@ -10,9 +10,10 @@ namespace figurine {
 
 class StageClock {
  public:
-  explicit StageClock(uint64_t (*now_ns)()) : now_ns_(now_ns) {}
+  StageClock() = default;
+  StageClock(uint64_t (*now_ns)(void* user), void* user) : now_ns_(now_ns), user_(user) {}
 
-  uint64_t now() const { return now_ns_ == nullptr ? 0 : now_ns_(); }
+  uint64_t now() const { return now_ns_ == nullptr ? 0 : now_ns_(user_); }
   void add(Stage stage, uint64_t duration_ns) {
     stage_ns_[static_cast<size_t>(stage)] += duration_ns;
   }
@@ -33,7 +34,8 @@ class StageClock {
   };
 
  private:
-  uint64_t (*now_ns_)();
+  uint64_t (*now_ns_)(void* user) = nullptr;
+  void* user_ = nullptr;
   std::array<uint64_t, kStageCount> stage_ns_{};
 };
 

@@ -72,6 +72,19 @@ Result<ThreadPool> ThreadPool::create(uint32_t threads) {
   return pool;
 }
 
+Result<std::shared_ptr<ThreadPool>> make_thread_pool(const ThreadOptions& options) {
+  uint32_t threads = options.threads;
+  if (threads <= ThreadPool::kMaxThreads && !options.allow_oversubscription)
+    threads = std::min(threads, allowed_cpus());
+  Result<ThreadPool> pool = ThreadPool::create(threads);
+  if (!pool.ok()) return pool.status();
+  std::shared_ptr<ThreadPool> shared(new (std::nothrow) ThreadPool(std::move(pool).value()));
+  if (shared == nullptr) return Status(StatusCode::kOutOfMemory, "threads: no memory for a pool");
+  return shared;
+}
+
+uint32_t thread_count(const ThreadPool& pool) { return pool.threads(); }
+
 uint32_t allowed_cpus() {
   cpu_set_t set;
   CPU_ZERO(&set);

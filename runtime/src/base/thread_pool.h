@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "figurine/status.h"
+#include "figurine/threads.h"
 #include "runtime/src/base/worker_pool.h"
 
 struct pthreadpool;

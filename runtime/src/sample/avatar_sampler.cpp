@@ -8,6 +8,7 @@
 
 #include "figurine/detail/double_math.h"
 #include "runtime/src/base/memory.h"
+#include "runtime/src/kernels/table.h"
 #include "runtime/src/sample/device_transformer.h"
 #include "runtime/src/sample/noise.h"
 #include "runtime/src/sample/solver.h"
@@ -138,13 +139,17 @@ class Watcher final : public SolverTrace<double> {
 AvatarSampler::AvatarSampler(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 AvatarSampler::~AvatarSampler() = default;
 
-Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& sampler) {
+Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& sampler,
+                                                             std::optional<Isa> isa) {
+  const Result<const KernelTable*> kernels = kernels_for(isa.value_or(supported_isas().back()));
+  if (!kernels.ok()) return kernels.status();
   std::unique_ptr<Impl> impl(new (std::nothrow) Impl(sampler));
   if (impl == nullptr || !impl->allocate()) return out_of_memory("the sampler");
   Result<NoiseSchedule> schedule = NoiseSchedule::create(sampler.noise);
   if (!schedule.ok()) return schedule.status();
   impl->schedule = *schedule;
-  Result<std::unique_ptr<DeviceTransformer>> transformer = DeviceTransformer::create(impl->sampler);
+  Result<std::unique_ptr<DeviceTransformer>> transformer =
+      DeviceTransformer::create(impl->sampler, **kernels);
   if (!transformer.ok()) return transformer.status();
   impl->transformer = std::move(*transformer);
   return std::unique_ptr<AvatarSampler>(new AvatarSampler(std::move(impl)));
