@@ -4,8 +4,7 @@
 //   minimal AVATAR.fgn BODY.fgn WIDTH HEIGHT > frame.rgba        (ffmpeg -f rawvideo -pix_fmt rgba
 //   -s 512x512 -i frame.rgba frame.png)
 //
-// It needs the runtime library and nothing else of the project. In C++ for now: the C interface
-// comes with a later version.
+// It needs the runtime library and nothing else of the project. minimal.c is the same in C.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -8,7 +8,7 @@ import tempfile
 import unittest
 
 CHECKER = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_symbols"
-SO = "runtime/libfigurine_runtime.so"
+SO = "runtime/libfigurine.so"
 ARCHIVES = [
     "runtime/libfigurine_runtime.a",
     "formats/libfigurine_formats.a",
@@ -82,7 +82,16 @@ def add_kernel(folder, name, source):
     subprocess.run(["ar", "rc", str(pathlib.Path(folder, ARCHIVES[0])), str(item)], check=True)
 
 
-def build(folder, sources):
+def interface():
+    """What the library exports: the functions of figurine.h, by another way than the checker's."""
+    lines = (CHECKER.parents[1] / "runtime/include/figurine.h").read_text(encoding="utf-8")
+    names = {re.search(r"fig_\w+(?=\()", declaration).group()
+             for declaration in re.split(r"^FIG_API ", lines, flags=re.MULTILINE)[1:]}
+    return "".join(f'extern "C" __attribute__((visibility("default"))) void {name}() {{}}\n'
+                   for name in sorted(names))
+
+
+def build(folder, sources, exported=None):
     for name, source in sources.items():
         path = pathlib.Path(folder, name)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -91,7 +100,10 @@ def build(folder, sources):
         if name in PROGRAMS:
             subprocess.run(["g++", str(text), "-o", str(path)], check=True)
         elif name == SO:
-            command = ["g++", "-O1", "-shared", "-fPIC", str(text), "-o", str(path)]
+            text.write_text(source + (interface() if exported is None else exported),
+                            encoding="utf-8")
+            command = ["g++", "-O1", "-shared", "-fPIC", "-fvisibility=hidden", str(text), "-o",
+                       str(path)]
             subprocess.run(command, check=True)
         else:
             subprocess.run(["g++", "-O1", "-c", str(text), "-o", str(item)], check=True)
@@ -128,6 +140,22 @@ class CheckSymbols(unittest.TestCase):
                 self.assertIn(f"{name}: ", report)
                 self.assertIn(words, report)
                 build(self.folder.name, {name: SOUND})
+
+    def test_the_library_exports_the_interface_and_nothing_else(self):
+        whole = interface()
+        self.assertGreater(whole.count("fig_"), 40)
+        first = whole.splitlines(keepends=True)[0]
+        for exported, words in [
+                (whole + first.replace("fig_", "fig_extra_"),
+                 f"{SO}: exports fig_extra_default_avatar_options, which figurine.h does not"),
+                (whole + '__attribute__((visibility("default"))) void plain() {}\n',
+                 f"{SO}: exports _Z5plainv, which"),
+                (whole.replace(first, ""), f"{SO}: does not export fig_default_avatar_options")]:
+            with self.subTest(words=words):
+                build(self.folder.name, {SO: SOUND}, exported)
+                code, report = check(self.folder.name)
+                self.assertEqual(code, 1, report)
+                self.assertIn(words, report)
 
     def test_a_kernel_defines_its_row_and_nothing_else(self):
         for source, words in KERNEL_BREACHES:

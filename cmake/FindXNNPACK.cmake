@@ -1,0 +1,19 @@
+# XNNPACK and the pthreadpool that its interface speaks of, which install no CMake package:
+#   XNNPACK::XNNPACK, XNNPACK::pthreadpool; XNNPACK_LIBRARY, XNNPACK_INCLUDE_DIR.
+# Installed beside figurine's own package, whose users link the same.
+find_library(XNNPACK_LIBRARY XNNPACK)
+find_library(XNNPACK_PTHREADPOOL_LIBRARY pthreadpool)
+find_path(XNNPACK_INCLUDE_DIR xnnpack.h)
+mark_as_advanced(XNNPACK_LIBRARY XNNPACK_PTHREADPOOL_LIBRARY XNNPACK_INCLUDE_DIR)
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(XNNPACK
+  REQUIRED_VARS XNNPACK_LIBRARY XNNPACK_PTHREADPOOL_LIBRARY XNNPACK_INCLUDE_DIR)
+if(XNNPACK_FOUND AND NOT TARGET XNNPACK::XNNPACK)
+  add_library(XNNPACK::XNNPACK UNKNOWN IMPORTED GLOBAL)
+  set_target_properties(XNNPACK::XNNPACK PROPERTIES IMPORTED_LOCATION "${XNNPACK_LIBRARY}"
+    INTERFACE_INCLUDE_DIRECTORIES "${XNNPACK_INCLUDE_DIR}")
+  add_library(XNNPACK::pthreadpool UNKNOWN IMPORTED GLOBAL)
+  set_target_properties(XNNPACK::pthreadpool PROPERTIES
+    IMPORTED_LOCATION "${XNNPACK_PTHREADPOOL_LIBRARY}"
+    INTERFACE_INCLUDE_DIRECTORIES "${XNNPACK_INCLUDE_DIR}")
+endif()

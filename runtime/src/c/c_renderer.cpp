@@ -1,0 +1,472 @@
+// Renderers, their avatars and frames of figurine.h.
+#include <array>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "figurine/renderer.h"
+#include "runtime/src/c/c_package.h"
+#include "runtime/src/c/c_sampler.h"
+#include "runtime/src/c/isa.h"
+#include "runtime/src/c/report.h"
+#include "runtime/src/c/structs.h"
+
+namespace figurine::c {
+namespace {
+
+static_assert(FIG_PIXEL_RGBA8 == static_cast<int>(PixelFormat::kRgba8));
+static_assert(FIG_PIXEL_RGBA_F32 == static_cast<int>(PixelFormat::kRgbaF32));
+static_assert(FIG_PIXEL_BGRA8 == static_cast<int>(PixelFormat::kBgra8));
+static_assert(FIG_PIXEL_RGB24 == static_cast<int>(PixelFormat::kRgb24));
+static_assert(FIG_PIXEL_BGR24 == static_cast<int>(PixelFormat::kBgr24));
+static_assert(FIG_PIXEL_YUYV == static_cast<int>(PixelFormat::kYuyv));
+static_assert(FIG_PIXEL_NV12 == static_cast<int>(PixelFormat::kNv12));
+static_assert(FIG_MATRIX_BT709 == static_cast<int>(YcbcrMatrix::kBt709));
+static_assert(FIG_MATRIX_BT601 == static_cast<int>(YcbcrMatrix::kBt601));
+
+struct ThreadsObject final : Object {
+  static constexpr ObjectKind kKind = ObjectKind::kThreads;
+  std::shared_ptr<ThreadPool> pool;
+};
+
+struct RendererObject final : Object {
+  static constexpr ObjectKind kKind = ObjectKind::kRenderer;
+  Pin<ThreadsObject> threads;
+  std::unique_ptr<Renderer> renderer;
+  std::vector<uint64_t> avatars;  // handles of its AvatarObjects
+  // A frame's arrays in C++; they grow and stay, so that a frame allocates nothing.
+  std::vector<FrameAvatar> seen;
+  std::vector<GaussianView> gaussians;
+};
+
+// What an avatar borrows. It is touched by calls alone that have its renderer to themselves.
+struct AvatarObject final : Object {
+  static constexpr ObjectKind kKind = ObjectKind::kAvatar;
+  uint64_t renderer = 0;
+  AvatarId id{};
+  Pin<PackageObject> body, package;
+  Pin<SampledObject> sampled;
+  Buffer<float> member;  // a population's, opened
+};
+
+Result<AvatarId> avatar_of(fig_renderer renderer, fig_avatar avatar) {
+  bool own = false;
+  AvatarId id{};
+  FIG_RETURN_IF_ERROR(handles().look<AvatarObject>(avatar.id, [&](const AvatarObject& object) {
+    own = object.renderer == renderer.id;
+    id = object.id;
+  }));
+  if (!own) return invalid("avatar: the handle is one of another renderer's");
+  return id;
+}
+
+Result<std::optional<Precision>> precision_of(const fig_avatar_options* given) {
+  const Result<fig_avatar_options> options =
+      read_options(given, fig_default_avatar_options(), "avatar options");
+  if (!options.ok()) return options.status();
+  if (options->precision > FIG_PRECISION_Q8) {
+    return invalid("precision: " + std::to_string(static_cast<int>(options->precision)) +
+                   " is none");
+  }
+  if (options->precision == FIG_PRECISION_DEFAULT) return std::optional<Precision>();
+  return std::optional<Precision>(options->precision == FIG_PRECISION_F32 ? Precision::kFloat32
+                                                                          : Precision::kFixedPoint);
+}
+
+// An avatar package's content, or a population's member, opened into the object's storage.
+Result<Avatar> content_of(const Package& package, uint32_t member, AvatarObject& object) {
+  if (package.kind() != PackageKind::kPopulation) {
+    FIG_RETURN_IF_ERROR(check_kind(package, PackageKind::kAvatar));
+    if (member != 0) return invalid("member: must be 0 of a package that is no population");
+    return package.avatar();
+  }
+  const Population& population = package.population();
+  if (member >= population.size()) {
+    return Status(StatusCode::kNotFound, "member " + std::to_string(member) + ": there are " +
+                                             std::to_string(population.size()) + ", from 0");
+  }
+  const size_t floats = member_floats(population);
+  if (!object.member.ensure(floats)) return out_of_memory("a member's weights");
+  return open_member(population, member, object.member.span(floats));
+}
+
+// The rest of adding, once the avatar and all that it borrows are in hand.
+Status add(RendererObject& renderer, fig_renderer handle, const Avatar& avatar,
+           std::unique_ptr<AvatarObject> object, const fig_avatar_options* options,
+           fig_avatar* out) {
+  const Result<std::optional<Precision>> precision = precision_of(options);
+  if (!precision.ok()) return precision.status();
+  const Result<AvatarId> id =
+      renderer.renderer->add_avatar(avatar, object->body->package, *precision);
+  if (!id.ok()) return id.status();
+  object->renderer = handle.id;
+  object->id = *id;
+  const Result<uint64_t> added = handles().add(std::move(object));
+  if (!added.ok()) {
+    static_cast<void>(renderer.renderer->remove_avatar(*id));
+    return added.status();
+  }
+  renderer.avatars.push_back(*added);
+  out->id = *added;
+  return {};
+}
+
+Result<GaussianView> gaussians_of(const fig_gaussians& given) {
+  if (given.sh_degree > kMaxShDegree)
+    return invalid("SH degree " + std::to_string(given.sh_degree) + " is above 3");
+  const size_t n = given.count;
+  if (n > 0 && (given.position_m == nullptr || given.covariance_factor == nullptr ||
+                given.opacity == nullptr || given.sh == nullptr)) {
+    return invalid("an array is NULL");
+  }
+  return GaussianView{.count = given.count,
+                      .sh_degree = given.sh_degree,
+                      .position_m = {given.position_m, 3 * n},
+                      .covariance_factor = {given.covariance_factor, 9 * n},
+                      .opacity = {given.opacity, n},
+                      .sh = {given.sh, 3 * n * sh_coefficients(given.sh_degree)}};
+}
+
+// Element i of an array whose elements are structs of one size. Texts only where there is an error.
+template <class T>
+Result<T> read_element(const T* array, size_t i, const T& defaults, const char* what) {
+  const auto where = [&] { return std::string(what) + "[" + std::to_string(i) + "]"; };
+  const T* const given = i == 0 ? array : element(array, i);
+  Result<T> read = read_struct(given, defaults, "element");
+  if (!read.ok()) return read.status().within(where());
+  if (given->struct_bytes != array->struct_bytes)
+    return invalid(where() + ": struct_bytes differs from the first's");
+  return read;
+}
+
+Status read_avatars(const fig_frame& frame, fig_renderer renderer, RendererObject& object) {
+  object.seen.clear();
+  if (frame.avatar_count > 0) FIG_RETURN_IF_ERROR(check_out(frame.avatars, "avatars"));
+  for (size_t i = 0; i < frame.avatar_count; ++i) {
+    const auto where = [&] { return "avatars[" + std::to_string(i) + "]"; };
+    const Result<fig_frame_avatar> given =
+        read_element(frame.avatars, i, fig_default_frame_avatar(), "avatars");
+    if (!given.ok()) return given.status();
+    const Result<AvatarId> id = avatar_of(renderer, given->avatar);
+    if (!id.ok()) return id.status().within(where());
+    const Result<PoseView> pose = pose_of(given->pose);
+    if (!pose.ok()) return pose.status().within(where());
+    object.seen.push_back({.avatar = *id, .pose = *pose});
+  }
+  return {};
+}
+
+Status read_gaussians(const fig_frame& frame, RendererObject& object) {
+  object.gaussians.clear();
+  if (frame.gaussians_count > 0) FIG_RETURN_IF_ERROR(check_out(frame.gaussians, "gaussians"));
+  for (size_t i = 0; i < frame.gaussians_count; ++i) {
+    const Result<fig_gaussians> given =
+        read_element(frame.gaussians, i, fig_default_gaussians(), "gaussians");
+    if (!given.ok()) return given.status();
+    const Result<GaussianView> view = gaussians_of(*given);
+    if (!view.ok()) return view.status().within("gaussians[" + std::to_string(i) + "]");
+    object.gaussians.push_back(*view);
+  }
+  return {};
+}
+
+Result<LeaveOut> leave_out_of(uint32_t bits) {
+  if ((bits & ~uint32_t{FIG_LEAVE_OUT_ALL}) != 0) return invalid("leave_out: an unknown bit");
+  const auto has = [&](fig_leave_out bit) { return (bits & static_cast<uint32_t>(bit)) != 0; };
+  return LeaveOut{.hidden_texels = has(FIG_LEAVE_OUT_HIDDEN_TEXELS),
+                  .transparent = has(FIG_LEAVE_OUT_TRANSPARENT),
+                  .outside = has(FIG_LEAVE_OUT_OUTSIDE),
+                  .missed_tiles = has(FIG_LEAVE_OUT_MISSED_TILES),
+                  .stopped = has(FIG_LEAVE_OUT_STOPPED)};
+}
+
+// Borrows the object's arrays.
+Result<Frame> frame_of(const fig_frame* given, fig_renderer renderer, RendererObject& object) {
+  const Result<fig_frame> read = read_struct(given, fig_default_frame(), "frame");
+  if (!read.ok()) return read.status();
+  const Result<Camera> camera = camera_of(read->camera);
+  if (!camera.ok()) return camera.status();
+  const Result<LeaveOut> leave_out = leave_out_of(read->leave_out);
+  if (!leave_out.ok()) return leave_out.status();
+  FIG_RETURN_IF_ERROR(read_avatars(*read, renderer, object));
+  FIG_RETURN_IF_ERROR(read_gaussians(*read, object));
+  Frame frame{.camera = *camera,
+              .avatars = object.seen,
+              .gaussians = object.gaussians,
+              .background = std::nullopt,
+              .splat = {.alpha_cut = read->alpha_cut},
+              .leave_out = *leave_out};
+  if (const float* const rgb = read->background; rgb != nullptr)
+    frame.background = std::array<float, 3>{rgb[0], rgb[1], rgb[2]};
+  return frame;
+}
+
+Result<ImageTarget> target_of(const fig_image* given) {
+  const Result<fig_image> image = read_struct(given, fig_default_image(), "image");
+  if (!image.ok()) return image.status();
+  if (image->format > FIG_PIXEL_NV12)
+    return invalid("image: unknown pixel format " +
+                   std::to_string(static_cast<int>(image->format)));
+  if (image->matrix > FIG_MATRIX_BT601)
+    return invalid("image: unknown matrix " + std::to_string(static_cast<int>(image->matrix)));
+  return ImageTarget{.pixels = image->pixels,
+                     .stride_bytes = image->stride_bytes,
+                     .format = static_cast<PixelFormat>(image->format),
+                     .chroma = image->chroma,
+                     .chroma_stride_bytes = image->chroma_stride_bytes,
+                     .matrix = static_cast<YcbcrMatrix>(image->matrix)};
+}
+
+Result<Pin<RendererObject>> pin_renderer(fig_renderer renderer) {
+  return handles().pin<RendererObject>(renderer.id, Use::kExclusive);
+}
+
+}  // namespace
+}  // namespace figurine::c
+
+using namespace figurine;
+using namespace figurine::c;
+
+fig_renderer_options fig_default_renderer_options(void) {
+  return {.struct_bytes = sizeof(fig_renderer_options),
+          .threads = 1,
+          .pool = {0},
+          .isa = FIG_ISA_BEST,
+          .now_ns = nullptr,
+          .now_user = nullptr};
+}
+
+fig_avatar_options fig_default_avatar_options(void) {
+  return {.struct_bytes = sizeof(fig_avatar_options), .precision = FIG_PRECISION_DEFAULT};
+}
+
+fig_renderer_info fig_default_renderer_info(void) {
+  fig_renderer_info info{};
+  info.struct_bytes = sizeof info;
+  return info;
+}
+
+fig_image fig_default_image(void) {
+  fig_image image{};
+  image.struct_bytes = sizeof image;
+  return image;
+}
+
+fig_frame_avatar fig_default_frame_avatar(void) {
+  fig_frame_avatar avatar{};
+  avatar.struct_bytes = sizeof avatar;
+  return avatar;
+}
+
+fig_gaussians fig_default_gaussians(void) {
+  fig_gaussians gaussians{};
+  gaussians.struct_bytes = sizeof gaussians;
+  return gaussians;
+}
+
+fig_frame fig_default_frame(void) {
+  fig_frame frame{};
+  frame.struct_bytes = sizeof frame;
+  frame.alpha_cut = kAlphaCut;
+  frame.leave_out = FIG_LEAVE_OUT_ALL;
+  return frame;
+}
+
+fig_statistics fig_default_statistics(void) {
+  fig_statistics statistics{};
+  statistics.struct_bytes = sizeof statistics;
+  return statistics;
+}
+
+fig_status fig_threads_create(uint32_t threads, fig_threads* created) {
+  FIG_REPORT_IF_ERROR(check_out(created, "threads"));
+  *created = {0};
+  Result<std::shared_ptr<ThreadPool>> pool = make_thread_pool({.threads = threads});
+  if (!pool.ok()) return report(pool.status());
+  std::unique_ptr<ThreadsObject> object(new (std::nothrow) ThreadsObject);
+  if (object == nullptr) return report(out_of_memory("threads"));
+  object->pool = std::move(*pool);
+  const Result<uint64_t> handle = handles().add(std::move(object));
+  if (!handle.ok()) return report(handle.status());
+  created->id = *handle;
+  return FIG_OK;
+}
+
+fig_status fig_threads_destroy(fig_threads threads) {
+  return report(handles().remove<ThreadsObject>(threads.id).status());
+}
+
+fig_status fig_renderer_create(const fig_renderer_options* options, fig_renderer* renderer) {
+  FIG_REPORT_IF_ERROR(check_out(renderer, "renderer"));
+  *renderer = {0};
+  const Result<fig_renderer_options> read =
+      read_options(options, fig_default_renderer_options(), "renderer options");
+  if (!read.ok()) return report(read.status());
+  const Result<std::optional<Isa>> isa = isa_of(read->isa);
+  if (!isa.ok()) return report(isa.status());
+  std::unique_ptr<RendererObject> object(new (std::nothrow) RendererObject);
+  if (object == nullptr) return report(out_of_memory("a renderer"));
+  RendererOptions wanted{
+      .threads = read->threads, .now_ns = read->now_ns, .now_user = read->now_user, .isa = *isa};
+  if (read->pool.id != 0) {
+    Result<Pin<ThreadsObject>> pool = handles().pin<ThreadsObject>(read->pool.id);
+    if (!pool.ok()) return report(pool.status());
+    object->threads = std::move(*pool);
+    wanted.pool = object->threads->pool;
+  }
+  Result<std::unique_ptr<Renderer>> created = Renderer::create(wanted);
+  if (!created.ok()) return report(created.status());
+  object->renderer = std::move(*created);
+  const Result<uint64_t> handle = handles().add(std::move(object));
+  if (!handle.ok()) return report(handle.status());
+  renderer->id = *handle;
+  return FIG_OK;
+}
+
+fig_status fig_renderer_destroy(fig_renderer renderer) {
+  Result<std::unique_ptr<RendererObject>> removed = handles().remove<RendererObject>(renderer.id);
+  if (!removed.ok()) return report(removed.status());
+  (*removed)->renderer.reset();  // before what its avatars borrow
+  for (const uint64_t avatar : (*removed)->avatars)
+    static_cast<void>(handles().remove<AvatarObject>(avatar));
+  return FIG_OK;
+}
+
+fig_status fig_renderer_add_avatar(fig_renderer renderer, fig_package package, uint32_t member,
+                                   fig_package body, const fig_avatar_options* options,
+                                   fig_avatar* avatar) {
+  FIG_REPORT_IF_ERROR(check_out(avatar, "avatar"));
+  *avatar = {0};
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  Result<Pin<PackageObject>> from = handles().pin<PackageObject>(package.id);
+  if (!from.ok()) return report(from.status().within("avatar"));
+  Result<Pin<PackageObject>> on = handles().pin<PackageObject>(body.id);
+  if (!on.ok()) return report(on.status().within("body"));
+  std::unique_ptr<AvatarObject> object(new (std::nothrow) AvatarObject);
+  if (object == nullptr) return report(out_of_memory("an avatar"));
+  const Result<Avatar> content = content_of((*from)->package, member, *object);
+  if (!content.ok()) return report(content.status());
+  object->package = std::move(*from);
+  object->body = std::move(*on);
+  return report(add(**pinned, renderer, *content, std::move(object), options, avatar));
+}
+
+fig_status fig_renderer_add_sampled(fig_renderer renderer, fig_sampled sampled, fig_package body,
+                                    const fig_avatar_options* options, fig_avatar* avatar) {
+  FIG_REPORT_IF_ERROR(check_out(avatar, "avatar"));
+  *avatar = {0};
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  Result<Pin<SampledObject>> from = handles().pin<SampledObject>(sampled.id);
+  if (!from.ok()) return report(from.status());
+  Result<Pin<PackageObject>> on = handles().pin<PackageObject>(body.id);
+  if (!on.ok()) return report(on.status().within("body"));
+  std::unique_ptr<AvatarObject> object(new (std::nothrow) AvatarObject);
+  if (object == nullptr) return report(out_of_memory("an avatar"));
+  const Avatar& content = (*from)->sampled.avatar();
+  object->sampled = std::move(*from);
+  object->body = std::move(*on);
+  return report(add(**pinned, renderer, content, std::move(object), options, avatar));
+}
+
+fig_status fig_renderer_remove_avatar(fig_renderer renderer, fig_avatar avatar) {
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  const Result<AvatarId> id = avatar_of(renderer, avatar);
+  if (!id.ok()) return report(id.status());
+  FIG_REPORT_IF_ERROR((*pinned)->renderer->remove_avatar(*id));
+  std::erase((*pinned)->avatars, avatar.id);
+  return report(handles().remove<AvatarObject>(avatar.id).status());
+}
+
+fig_status fig_renderer_get_info(fig_renderer renderer, fig_renderer_info* info) {
+  FIG_REPORT_IF_ERROR(check_struct(info, "renderer info"));
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  fig_renderer_info whole = fig_default_renderer_info();
+  whole.threads = (*pinned)->renderer->threads();
+  whole.isa = c_isa((*pinned)->renderer->isa());
+  whole.avatar_count = static_cast<uint32_t>((*pinned)->avatars.size());
+  whole.memory_bytes = (*pinned)->renderer->memory_bytes();
+  fill_struct(whole, info);
+  return FIG_OK;
+}
+
+fig_status fig_renderer_avatar_precision(fig_renderer renderer, fig_avatar avatar,
+                                         fig_precision* precision) {
+  FIG_REPORT_IF_ERROR(check_out(precision, "precision"));
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  const Result<AvatarId> id = avatar_of(renderer, avatar);
+  if (!id.ok()) return report(id.status());
+  *precision = (*pinned)->renderer->precision(*id) == Precision::kFixedPoint ? FIG_PRECISION_Q8
+                                                                             : FIG_PRECISION_F32;
+  return FIG_OK;
+}
+
+fig_status fig_renderer_render(fig_renderer renderer, const fig_frame* frame,
+                               const fig_image* image) {
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  const Result<Frame> wanted = frame_of(frame, renderer, **pinned);
+  if (!wanted.ok()) return report(wanted.status());
+  const Result<ImageTarget> target = target_of(image);
+  if (!target.ok()) return report(target.status());
+  return report((*pinned)->renderer->render(*wanted, *target));
+}
+
+fig_status fig_renderer_pose_avatar(fig_renderer renderer, fig_avatar avatar, const fig_pose* pose,
+                                    fig_gaussians* gaussians) {
+  FIG_REPORT_IF_ERROR(check_struct(gaussians, "gaussians"));
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  const Result<AvatarId> id = avatar_of(renderer, avatar);
+  if (!id.ok()) return report(id.status());
+  const Result<PoseView> wanted = pose_of(pose);
+  if (!wanted.ok()) return report(wanted.status());
+  const Result<GaussianView> posed = (*pinned)->renderer->pose_avatar(*id, *wanted);
+  if (!posed.ok()) return report(posed.status());
+  fig_gaussians whole = fig_default_gaussians();
+  whole.count = posed->count;
+  whole.sh_degree = posed->sh_degree;
+  whole.position_m = posed->position_m.data();
+  whole.covariance_factor = posed->covariance_factor.data();
+  whole.opacity = posed->opacity.data();
+  whole.sh = posed->sh.data();
+  fill_struct(whole, gaussians);
+  return FIG_OK;
+}
+
+fig_status fig_renderer_statistics(fig_renderer renderer, fig_statistics* statistics) {
+  FIG_REPORT_IF_ERROR(check_struct(statistics, "statistics"));
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  const FrameStatistics& of_frame = (*pinned)->renderer->statistics();
+  const auto stage = [&](Stage which) { return of_frame.stage_ns[static_cast<size_t>(which)]; };
+  fig_statistics whole = fig_default_statistics();
+  whole.maps_ns = stage(Stage::kMaps);
+  whole.network_ns = stage(Stage::kNetwork);
+  whole.decode_ns = stage(Stage::kDecode);
+  whole.skin_ns = stage(Stage::kSkin);
+  whole.project_ns = stage(Stage::kProject);
+  whole.bin_ns = stage(Stage::kBin);
+  whole.sort_ns = stage(Stage::kSort);
+  whole.blend_ns = stage(Stage::kBlend);
+  whole.resolve_ns = stage(Stage::kResolve);
+  whole.gaussians = of_frame.gaussians;
+  whole.visible = of_frame.visible;
+  whole.pairs = of_frame.pairs;
+  whole.blends = of_frame.blends;
+  whole.macs = of_frame.macs;
+  whole.hidden_texels = of_frame.left_out.hidden_texels;
+  whole.transparent = of_frame.left_out.transparent;
+  whole.outside = of_frame.left_out.outside;
+  whole.missed_tiles = of_frame.left_out.missed_tiles;
+  whole.stopped = of_frame.left_out.stopped;
+  fill_struct(whole, statistics);
+  return FIG_OK;
+}
