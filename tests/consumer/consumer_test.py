@@ -1,0 +1,130 @@
+"""What an application does with figurine: installs it, moves the prefix, builds the minimal program
+in C and in C++ against it by CMake and by pkg-config, and draws a frame with each.
+
+    consumer_test.py BUILD
+
+BUILD is a build folder in which the device's libraries are built; nothing of them is compiled here.
+"""
+import os
+import pathlib
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+HERE = ROOT / "tests/consumer"
+MINIMAL = ROOT / "samples/minimal"
+PACKAGES = [ROOT / "samples/packages" / name for name in ("person.fgn", "body-128.fgn")]
+BUILD = pathlib.Path()
+SIZE = 64
+
+
+def run(*command, environment=None):
+    """The output of a command that must work."""
+    done = subprocess.run([str(word) for word in command], capture_output=True, check=False,
+                          env={**os.environ, **(environment or {})})
+    if done.returncode != 0:
+        raise AssertionError(f"{shlex.join(str(word) for word in command)}:\n"
+                             f"{done.stdout.decode(errors='replace')[-3000:]}\n"
+                             f"{done.stderr.decode(errors='replace')[-3000:]}")
+    return done.stdout
+
+
+class Consumer(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(dir=BUILD)
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.work = pathlib.Path(cls.folder.name)
+        installed = cls.work / "installed"
+        for component in ("runtime", "development"):
+            run("cmake", "--install", BUILD, "--prefix", installed, "--component", component)
+        cls.prefix = cls.work / "moved"
+        installed.rename(cls.prefix)
+        cls.library = next(cls.prefix.rglob("libfigurine.so")).parent
+        cls.pictures = {}
+
+    def draw(self, program):
+        """The program's frame, which is no empty one."""
+        rgba = run(program, *PACKAGES, SIZE, SIZE,
+                   environment={"LD_LIBRARY_PATH": str(self.library)})
+        self.assertEqual(len(rgba), 4 * SIZE * SIZE)
+        self.assertGreater(sum(alpha > 127 for alpha in rgba[3::4]), 100)
+        return rgba
+
+    def build(self, project, target):
+        folder = self.work / project
+        run("cmake", "-G", "Ninja", "-S", HERE / project, "-B", folder, f"-DMINIMAL={MINIMAL}",
+            f"-DCMAKE_PREFIX_PATH={self.prefix}", "-DCMAKE_BUILD_TYPE=Release")
+        run("cmake", "--build", folder)
+        return folder / target
+
+    def flags(self, package):
+        return run("pkg-config", "--cflags", "--libs", package, environment={
+            "PKG_CONFIG_PATH": str(self.library / "pkgconfig")}).decode().split()
+
+    def test_all_four_draw_the_same(self):
+        by_cmake = [self.draw(self.build("c", "minimal_c")),
+                    self.draw(self.build("cpp", "minimal"))]
+        self.assertEqual(by_cmake[0], by_cmake[1])
+
+        program = self.work / "by-pkg-config"
+        run("cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-pedantic", MINIMAL / "minimal.c",
+            *self.flags("figurine"), "-o", program)
+        self.assertEqual(self.draw(program), by_cmake[0])
+        run("c++", "-std=c++20", MINIMAL / "minimal.cpp", *self.flags("figurine-runtime"), "-o",
+            program)
+        self.assertEqual(self.draw(program), by_cmake[0])
+
+    def test_installed_headers_need_nothing_else(self):
+        include = self.prefix / "include"
+        headers = [header.relative_to(include) for header in sorted(include.rglob("*.h"))]
+        self.assertIn(pathlib.Path("figurine.h"), headers)
+        self.assertIn(pathlib.Path("figurine/detail/half.h"), headers)
+        self.assertFalse([header for header in headers if "src" in header.parts])
+        sources = [f'#include "{header}"\n' for header in headers]
+        text = self.work / "headers.cpp"
+        for source in ["".join(sources), "".join(reversed(sources))]:
+            text.write_text(source, encoding="utf-8")
+            run("c++", "-std=c++20", "-fsyntax-only", f"-I{include}", text)
+
+    def test_no_path_of_the_build_is_installed(self):
+        for file in self.prefix.rglob("*"):
+            if file.suffix in {".cmake", ".pc", ".h"}:
+                text = file.read_text(encoding="utf-8")
+                for path in (BUILD, ROOT, self.work):
+                    self.assertNotIn(str(path), text, file)
+
+    def test_a_wrong_component_is_named(self):
+        folder = self.work / "wrong"
+        folder.mkdir()
+        (folder / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.25)\nproject(wrong LANGUAGES C)\n"
+            "find_package(figurine REQUIRED COMPONENTS trainer)\n", encoding="utf-8")
+        done = subprocess.run(
+            ["cmake", "-G", "Ninja", "-S", folder, "-B", folder / "build",
+             f"-DCMAKE_PREFIX_PATH={self.prefix}"], capture_output=True, text=True, check=False)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("no component 'trainer'", " ".join(done.stderr.split()))
+
+    def test_works_as_a_subdirectory(self):
+        folder = self.work / "subdirectory"
+        run("cmake", "-G", "Ninja", "-S", HERE / "subdirectory", "-B", folder,
+            f"-DFIGURINE_SOURCE={ROOT}")
+        targets = run("cmake", "--build", folder, "--target", "help").decode()
+        self.assertIn("minimal_c:", targets)
+        self.assertIn("libfigurine_runtime.a:", targets)
+        self.assertNotIn("figurine-inspect", targets, "brings its tools along")
+        self.assertNotIn("_test:", targets, "brings its tests along")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2 or not pathlib.Path(sys.argv[1]).is_dir():
+        sys.exit("usage: consumer_test.py BUILD")
+    BUILD = pathlib.Path(sys.argv.pop()).resolve()
+    if not shutil.which("pkg-config"):
+        sys.exit("consumer_test: no pkg-config")
+    unittest.main()
