@@ -9,8 +9,8 @@
 #include <limits>
 #include <numeric>
 
-#include "formats/src/package_content.h"
-#include "formats/src/package_text.h"
+#include "formats/src/package/content.h"
+#include "formats/src/package/text.h"
 
 namespace figurine {
 

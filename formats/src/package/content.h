@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/src/package_container.h"
+#include "formats/src/package/container.h"
 
 namespace figurine {
 

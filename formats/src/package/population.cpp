@@ -7,8 +7,8 @@
 #include <set>
 
 #include "figurine/rans.h"
-#include "formats/src/package_content.h"
-#include "formats/src/package_text.h"
+#include "formats/src/package/content.h"
+#include "formats/src/package/text.h"
 
 namespace figurine {
 

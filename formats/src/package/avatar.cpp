@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "figurine/gaussian.h"
-#include "formats/src/package_content.h"
+#include "formats/src/package/content.h"
 
 namespace figurine {
 
