@@ -114,17 +114,11 @@ Avatar open_member(const Population& population, size_t member, std::span<float>
   }
 
   const PopulationMember& own = population.members[member];
-  Avatar avatar{.name = own.name,
-                .body_name = population.body_name,
-                .body_hash = population.body_hash,
-                .preset = population.preset,
-                .template_mode = population.template_mode,
-                .shape = row_of(population.shape, population, member),
-                .map_statistics = own.map_statistics,
-                .fourier_octaves = population.fourier_octaves,
-                .decoding = own.decoding,
-                .network = population.network,
-                .golden = own.golden};
+  Avatar avatar;
+  avatar.kind() = population.kind();
+  avatar.traits() = own.traits();
+  avatar.name = own.name;
+  avatar.shape = row_of(population.shape, population, member);
   const std::span<const float> bias = row_of(population.bias, population, member);
   size_t at = 0, row = 0;
   for (Layer& layer : avatar.network.layers) {

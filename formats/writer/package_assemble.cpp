@@ -3,8 +3,8 @@
 // them).
 #include <cstring>
 
-#include "formats/src/checksum.h"
-#include "formats/src/package_layout.h"
+#include "formats/src/package/checksum.h"
+#include "formats/src/package/layout.h"
 #include "formats/writer/package_parts.h"
 #include "package_generated.h"
 

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "formats/src/package_text.h"
+#include "formats/src/package/text.h"
 #include "formats/writer/package_parts.h"
 
 namespace figurine {

@@ -243,25 +243,22 @@ Status check(const NewPopulation& population) {
 Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
   FIG_RETURN_IF_ERROR(check(from));
   const Avatar& first = *from.members.front().avatar;
-  Population to{.name = from.name,
-                .body_name = first.body_name,
-                .body_hash = first.body_hash,
-                .preset = first.preset,
-                .template_mode = first.template_mode,
-                .fourier_octaves = first.fourier_octaves,
-                .network = from.initial,
-                .coding = from.coding,
-                .pose_joints = first.pose_statistics.joints};
+  Population to;
+  to.kind() = first.kind();
+  to.name = from.name;
+  to.network = from.initial;
+  to.coding = from.coding;
+  to.pose_joints = first.pose_statistics.joints;
   Storage storage;
   std::vector<Kernels> kernels;
   std::vector<Provenance> own;
   for (const NewMember& member : from.members) {
     const Avatar& avatar = *member.avatar;
-    PopulationMember& described = to.members.emplace_back(PopulationMember{
-        avatar.name, member.split, avatar.map_statistics, avatar.decoding, avatar.golden, {}});
-    described.golden.png = {};
-    described.golden.fixed_point_hash = {0, 0};
-    described.golden.fixed_point_library.clear();
+    PopulationMember& described = to.members.emplace_back();
+    described.traits() = avatar.traits();
+    described.golden = avatar.golden.without_picture();
+    described.name = avatar.name;
+    described.split = member.split;
     append(storage.shape, avatar.shape);
     append(storage.pose_mean, avatar.pose_statistics.mean);
     append(storage.golden_poses, avatar.golden.rotations);

@@ -8,9 +8,7 @@ Result<std::vector<std::byte>> write_sampler(const NewSampler& from) {
   FIG_CHECK(from.sampler != nullptr, "a sampler to write");
   Sampler sampler = *from.sampler;
   // A member's golden frame, where pose and camera are taken from, may have both.
-  sampler.golden.png = {};
-  sampler.golden.fixed_point_hash = {0, 0};
-  sampler.golden.fixed_point_library.clear();
+  sampler.golden = sampler.golden.without_picture();
   return write_package(sampler, from.budget, from.provenance);
 }
 

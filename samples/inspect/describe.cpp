@@ -200,20 +200,26 @@ Json describe_decoding(const HeadDecoding& decoding) {
   return json;
 }
 
+// The first lines of whatever is of a kind; `rest` follows.
+Json describe_kind(const AvatarKind& kind, const Json& rest) {
+  Json json{{"body", {{"name", kind.body_name}, {"hash", format_hash(kind.body_hash)}}},
+            {"preset", kind.preset},
+            {"template", template_name(kind.template_mode)}};
+  json.update(rest);
+  return json;
+}
+
 Json describe_avatar(const Avatar& avatar) {
-  return {{"body", {{"name", avatar.body_name}, {"hash", format_hash(avatar.body_hash)}}},
-          {"preset", avatar.preset},
-          {"template", template_name(avatar.template_mode)},
-          {"shape", numbers(avatar.shape)},
-          {"fourier_octaves", avatar.fourier_octaves},
-          {"map_mean", numbers(avatar.map_statistics.mean)},
-          {"map_scale", numbers(avatar.map_statistics.scale)},
-          {"decoding", describe_decoding(avatar.decoding)},
-          {"network", describe_network(avatar.network)},
-          {"precisions", describe_precisions(avatar)},
-          {"fixed_point", describe_fixed_point(avatar)},
-          {"pose_statistics_joints", avatar.pose_statistics.joints},
-          {"golden", describe_golden(avatar.golden)}};
+  return describe_kind(avatar, {{"shape", numbers(avatar.shape)},
+                                {"fourier_octaves", avatar.fourier_octaves},
+                                {"map_mean", numbers(avatar.map_statistics.mean)},
+                                {"map_scale", numbers(avatar.map_statistics.scale)},
+                                {"decoding", describe_decoding(avatar.decoding)},
+                                {"network", describe_network(avatar.network)},
+                                {"precisions", describe_precisions(avatar)},
+                                {"fixed_point", describe_fixed_point(avatar)},
+                                {"pose_statistics_joints", avatar.pose_statistics.joints},
+                                {"golden", describe_golden(avatar.golden)}});
 }
 
 Json describe_member(const Package& package, size_t m) {
@@ -243,15 +249,12 @@ Json describe_population(const Package& package) {
   const Population& population = package.population();
   Json members = Json::array();
   for (size_t m = 0; m < population.size(); ++m) members.push_back(describe_member(package, m));
-  return {{"body", {{"name", population.body_name}, {"hash", format_hash(population.body_hash)}}},
-          {"preset", population.preset},
-          {"template", template_name(population.template_mode)},
-          {"fourier_octaves", population.fourier_octaves},
-          {"network", describe_network(population.network)},
-          {"coding", to_string(population.coding)},
-          {"pose_statistics_joints", population.pose_joints},
-          {"quality_names", population.quality_names},
-          {"members", members}};
+  return describe_kind(population, {{"fourier_octaves", population.fourier_octaves},
+                                    {"network", describe_network(population.network)},
+                                    {"coding", to_string(population.coding)},
+                                    {"pose_statistics_joints", population.pose_joints},
+                                    {"quality_names", population.quality_names},
+                                    {"members", members}});
 }
 
 // [{op, scale, zero_point}] of every layer's output; the last one's is float.
@@ -322,31 +325,29 @@ Json describe_report(std::string_view report) {
 
 Json describe_sampler(const Sampler& sampler) {
   const NoiseScheduleOptions& noise = sampler.noise;
-  return {{"body", {{"name", sampler.body_name}, {"hash", format_hash(sampler.body_hash)}}},
-          {"preset", sampler.preset},
-          {"template", template_name(sampler.template_mode)},
-          {"shape_coefficients", sampler.shape_count},
-          {"fourier_octaves", sampler.fourier_octaves},
-          {"map_mean", numbers(sampler.map_statistics.mean)},
-          {"map_scale", numbers(sampler.map_statistics.scale)},
-          {"decoding", describe_decoding(sampler.decoding)},
-          {"network", describe_network(sampler.network)},
-          {"quantisation", describe_quantisation(sampler.network, sampler.values)},
-          {"pose_statistics_joints", sampler.pose_statistics.joints},
-          {"golden", describe_golden(sampler.golden)},
-          {"space", describe_space(sampler)},
-          {"denoiser", describe_denoiser(sampler)},
-          {"noise",
-           {{"dimension", noise.dimension},
-            {"noisy_dimension_snr", noise.noisy_dimension_snr},
-            {"decided_dimension_snr", noise.decided_dimension_snr},
-            {"clean_snr", noise.clean_snr},
-            {"band_share", noise.band_share}}},
-          {"steps", sampler.steps},
-          {"method", to_string(sampler.method)},
-          {"golden_seeds", describe_golden_seeds(sampler)},
-          {"population_hash", format_hash(sampler.population_hash)},
-          {"report", describe_report(sampler.report)}};
+  return describe_kind(sampler,
+                       {{"shape_coefficients", sampler.shape_count},
+                        {"fourier_octaves", sampler.fourier_octaves},
+                        {"map_mean", numbers(sampler.map_statistics.mean)},
+                        {"map_scale", numbers(sampler.map_statistics.scale)},
+                        {"decoding", describe_decoding(sampler.decoding)},
+                        {"network", describe_network(sampler.network)},
+                        {"quantisation", describe_quantisation(sampler.network, sampler.values)},
+                        {"pose_statistics_joints", sampler.pose_statistics.joints},
+                        {"golden", describe_golden(sampler.golden)},
+                        {"space", describe_space(sampler)},
+                        {"denoiser", describe_denoiser(sampler)},
+                        {"noise",
+                         {{"dimension", noise.dimension},
+                          {"noisy_dimension_snr", noise.noisy_dimension_snr},
+                          {"decided_dimension_snr", noise.decided_dimension_snr},
+                          {"clean_snr", noise.clean_snr},
+                          {"band_share", noise.band_share}}},
+                        {"steps", sampler.steps},
+                        {"method", to_string(sampler.method)},
+                        {"golden_seeds", describe_golden_seeds(sampler)},
+                        {"population_hash", format_hash(sampler.population_hash)},
+                        {"report", describe_report(sampler.report)}});
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "formats/src/checksum.h"
-#include "formats/src/package_text.h"
+#include "formats/src/package/checksum.h"
+#include "formats/src/package/text.h"
 #include "formats/writer/package_writer.h"
 
 namespace figurine::samples {

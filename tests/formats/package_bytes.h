@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "figurine/package.h"
-#include "formats/src/package_layout.h"
+#include "formats/src/package/layout.h"
 
 namespace figurine::samples {
 

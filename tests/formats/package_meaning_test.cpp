@@ -8,7 +8,7 @@
 
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
-#include "formats/src/package_text.h"
+#include "formats/src/package/text.h"
 #include "formats/writer/package_parts.h"
 
 namespace figurine {

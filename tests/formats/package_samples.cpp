@@ -240,17 +240,12 @@ Result<std::vector<std::byte>> write_sample(SampleKind kind) {
 SamplerSample::SamplerSample() {
   const FixedPointAvatarSample avatar;
   const Avatar& from = avatar.avatar;
-  sampler = {.name = "sample sampler",
-             .body_name = from.body_name,
-             .body_hash = from.body_hash,
-             .preset = from.preset,
-             .template_mode = from.template_mode,
-             .fourier_octaves = from.fourier_octaves,
-             .network = from.network,
-             .shape_count = 2,
-             .map_statistics = from.map_statistics,
-             .decoding = from.decoding,
-             .values = from.fixed_point.values};
+  sampler.kind() = from.kind();
+  sampler.name = "sample sampler";
+  sampler.shape_count = 2;
+  sampler.map_statistics = from.map_statistics;
+  sampler.decoding = from.decoding;
+  sampler.values = from.fixed_point.values;
   const std::vector<size_t> tokens = sampler_token_sizes(sampler);
   for (size_t token = 0; token < tokens.size(); ++token) {
     const auto rank = static_cast<uint32_t>(token % 2 + 1);

@@ -11,7 +11,7 @@ CHECKER = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_layer
 SOUND = {
     "formats/include/figurine/pose.h": "#include <array>\n",
     "formats/src/check.cpp": "#include <cstdio>\n",
-    "formats/src/package.cpp":
+    "formats/src/package/package.cpp":
         '#include <flatbuffers/verifier.h>\n#include <xxhash.h>\n#include "figurine/pose.h"\n',
     "formats/writer/package_writer.h": '#include "figurine/pose.h"\n',
     "samples/inspect/main.cpp":

@@ -259,179 +259,250 @@ Split default_split(uint32_t frame_count, uint32_t camera_count) {
   return split;
 }
 
-Dataset Dataset::open(const std::string& directory, const DatasetOptions& options) {
-  Dataset set;
-  set.directory_ = directory;
-  const fs::path root(directory);
-  if (!fs::is_directory(root)) throw InputError(directory + ": no such folder");
-
-  // Ours carries what the layout cannot.
-  const std::string own_path = (root / "figurine.json").string();
-  const bool own = fs::exists(own_path);
-  const json own_json = own ? read_json(own_path) : json::object();
-  const JsonField about(own_json, own_path + ": ");
-  if (own) {
-    if (about["version"].whole() != 1) about["version"].fail("unknown version; this build reads 1");
-    if (!about["complete"].boolean())
-      throw InputError(own_path +
-                       ": complete: the capture was interrupted; finish it with --resume");
-    set.seed_ = about["seed"].whole();
-    set.body_name_ = about["body"]["name"].text();
-    set.body_hash_ = about["body"]["hash"].text();
-    for (double s : about["shape"].numbers()) set.shape_.push_back(static_cast<float>(s));
-    for (const JsonField& source : about["sources"].items()) set.sources_.push_back(source.text());
-    const std::string background = about["background"].text();
-    if (background != "black") about["background"].fail("unknown background '" + background + "'");
-    set.composited_on_black_ = true;
-    if (!options.body_hash.empty() && options.body_hash != set.body_hash_) {
-      about["body"]["hash"].fail("captured with body " + set.body_hash_ +
-                                 ", but the given body is " + options.body_hash);
-    }
-  } else if (options.body == nullptr) {
-    throw InputError(
-        directory + ": has no figurine.json, so its poses need a body (the pelvis' rest position)");
-  }
-  if (options.body != nullptr && options.body->joint_count() != kSmplxJoints) {
-    throw InputError(directory + ": needs a body of 55 joints, the given one has " +
-                     std::to_string(options.body->joint_count()));
+// The steps of open(), in their order. Each fills a part of the set or throws; what one step learns
+// that a later one needs, and the set does not, lives here.
+class Dataset::Reading {
+ public:
+  Reading(const std::string& directory, const DatasetOptions& options)
+      : root_(directory),
+        options_(options),
+        own_path_((root_ / "figurine.json").string()),
+        own_(fs::exists(own_path_)),
+        own_json_(own_ ? read_json(own_path_) : json::object()),
+        about_(own_json_, own_path_ + ": ") {
+    set_.directory_ = directory;
   }
 
-  // Cameras. The key is "NUMBER_NAME.png".
-  const std::string intrinsics_path = (root / "camera_intrinsics.json").string();
-  const json intrinsics_json = read_json(intrinsics_path);
-  const std::vector<double> intrinsics =
-      JsonField(intrinsics_json, intrinsics_path + ": ")["intrinsics"].numbers(9);
-  const double scale = read_pickled_float((root / "camera_scale.pkl").string());
-  const std::string extrinsics_path = (root / "camera_extrinsics.json").string();
-  const json extrinsics_json = read_json(extrinsics_path);
-  if (!extrinsics_json.is_object())
-    throw InputError(extrinsics_path + ": not an object of cameras");
-  std::map<uint32_t, std::pair<std::string, std::string>> ordered;  // number -> key, name
-  for (const auto& [key, value] : extrinsics_json.items()) {
-    const std::optional<uint32_t> number = leading_number(key);
-    const size_t underscore = key.find('_');
-    if (!number || underscore == std::string::npos || underscore + 1 == key.size()) {
-      throw InputError(extrinsics_path + ": " + key + ": a camera is called NUMBER_NAME.png");
-    }
-    std::string name = key.substr(underscore + 1);
-    if (name.ends_with(".png")) name.resize(name.size() - 4);
-    if (name.find('/') != std::string::npos || name == "..")
-      throw InputError(extrinsics_path + ": " + key + ": not a folder's name");
-    if (!ordered.emplace(*number, std::pair(key, name)).second)
-      throw InputError(extrinsics_path + ": two cameras of number " + std::to_string(*number));
-  }
-  std::vector<std::map<uint32_t, std::string>> images, masks;
-  std::vector<uint32_t> camera_numbers;
-  for (const auto& [number, key_and_name] : ordered) {
-    const auto& [key, name] = key_and_name;
-    const fs::path image_folder = root / "images_lr" / name;
-    if (number == kWrongCamera || (!own && !fs::is_directory(image_folder))) {
-      ++set.cameras_left_out_;
-      continue;
-    }
-    images.push_back(numbered_files(image_folder.string(), ".jpg"));
-    masks.push_back(numbered_files((root / "fmask_lr" / name).string(), ".png"));
-    if (images.back().empty()) throw InputError(image_folder.string() + ": no images");
-    const std::string first = (image_folder / images.back().begin()->second).string();
-    const ImageSize size = decode_jpeg_size(map_file(first).bytes(), first);
-    CaptureCamera camera;
-    camera.name = name;
-    camera.camera = read_camera(JsonField(extrinsics_json, extrinsics_path + ": ")[key], intrinsics,
-                                scale, size);
-    // The images are half the size that the intrinsics speak of: a principal point outside the
-    // image shows data of another size.
-    if (!(camera.camera.cx_px > 0 && camera.camera.cx_px < size.width_px &&
-          camera.camera.cy_px > 0 && camera.camera.cy_px < size.height_px)) {
-      throw InputError(
-          intrinsics_path + ": intrinsics: principal point, halved, is outside the images of " +
-          name + " (" + std::to_string(size.width_px) + "x" + std::to_string(size.height_px) + ")");
-    }
-    set.cameras_.push_back(std::move(camera));
-    camera_numbers.push_back(number);
-  }
-  if (set.cameras_.empty()) throw InputError(directory + ": no usable camera");
-
-  // Frames: the images' numbers that have a pose.
-  std::map<uint32_t, JsonField> own_frames;
-  if (own) {
-    for (const JsonField& frame : about["frames"].items()) {
-      const uint64_t number = frame["number"].whole();
-      if (number == 0 || number > 999'999'999) frame["number"].fail("out of range");
-      if (!own_frames.emplace(static_cast<uint32_t>(number), frame).second)
-        frame["number"].fail("stands twice");
-    }
-  }
-  for (const auto& [number, file] : images[0]) {
-    CaptureFrame frame;
-    frame.number = number;
-    const auto found = own_frames.find(number);
-    if (found != own_frames.end()) {
-      const JsonField& field = found->second;
-      frame.split = parse_split(field["split"]);
-      const std::vector<double> translation = field["root_translation_m"].numbers(3);
-      for (int i = 0; i < 3; ++i) frame.root_translation_m[i] = static_cast<float>(translation[i]);
-      for (double q : field["rotations"].numbers(kSmplxJoints * 4))
-        frame.rotations.push_back(static_cast<float>(q));
-      throw_if_error(validate_pose(frame.pose(), kSmplxJoints), field["rotations"].where());
-    } else if (own) {
-      ++set.frames_without_pose_;
-      continue;
+  Dataset run() {
+    if (own_) read_own_description();
+    check_body();
+    read_cameras();
+    read_frames();
+    match_files();
+    if (own_) {
+      take_marked_split();
     } else {
-      const uint32_t index = number / kFrameStep;
-      const std::string path =
-          (root / "smplx" / "smpl" /
-           (std::string(6 - std::min<size_t>(6, std::to_string(index - 1).size()), '0') +
-            std::to_string(index - 1) + ".json"))
-              .string();
-      if (number % kFrameStep != 0 || index == 0 || !fs::exists(path)) {
-        ++set.frames_without_pose_;
+      split_by_rule();
+    }
+    return std::move(set_);
+  }
+
+ private:
+  // Number, then the camera's key and folder.
+  using CameraNames = std::map<uint32_t, std::pair<std::string, std::string>>;
+  using NumberedFiles = std::map<uint32_t, std::string>;
+
+  // figurine.json carries what the layout cannot.
+  void read_own_description() {
+    if (about_["version"].whole() != 1)
+      about_["version"].fail("unknown version; this build reads 1");
+    if (!about_["complete"].boolean())
+      throw InputError(own_path_ +
+                       ": complete: the capture was interrupted; finish it with --resume");
+    set_.seed_ = about_["seed"].whole();
+    set_.body_name_ = about_["body"]["name"].text();
+    set_.body_hash_ = about_["body"]["hash"].text();
+    for (double s : about_["shape"].numbers()) set_.shape_.push_back(static_cast<float>(s));
+    for (const JsonField& source : about_["sources"].items())
+      set_.sources_.push_back(source.text());
+    const std::string background = about_["background"].text();
+    if (background != "black") about_["background"].fail("unknown background '" + background + "'");
+    set_.composited_on_black_ = true;
+  }
+
+  void check_body() const {
+    if (own_ && !options_.body_hash.empty() && options_.body_hash != set_.body_hash_) {
+      about_["body"]["hash"].fail("captured with body " + set_.body_hash_ +
+                                  ", but the given body is " + options_.body_hash);
+    }
+    if (!own_ && options_.body == nullptr) {
+      throw InputError(
+          set_.directory_ +
+          ": has no figurine.json, so its poses need a body (the pelvis' rest position)");
+    }
+    if (options_.body != nullptr && options_.body->joint_count() != kSmplxJoints) {
+      throw InputError(set_.directory_ + ": needs a body of 55 joints, the given one has " +
+                       std::to_string(options_.body->joint_count()));
+    }
+  }
+
+  void read_cameras() {
+    const std::string intrinsics_path = (root_ / "camera_intrinsics.json").string();
+    const json intrinsics_json = read_json(intrinsics_path);
+    const std::vector<double> intrinsics =
+        JsonField(intrinsics_json, intrinsics_path + ": ")["intrinsics"].numbers(9);
+    const double scale = read_pickled_float((root_ / "camera_scale.pkl").string());
+    const std::string extrinsics_path = (root_ / "camera_extrinsics.json").string();
+    const json extrinsics_json = read_json(extrinsics_path);
+    const JsonField extrinsics(extrinsics_json, extrinsics_path + ": ");
+    for (const auto& [number, key_and_name] : camera_names(extrinsics_json, extrinsics_path)) {
+      const auto& [key, name] = key_and_name;
+      if (number == kWrongCamera || (!own_ && !fs::is_directory(image_folder(name)))) {
+        ++set_.cameras_left_out_;
         continue;
       }
-      const SmplxPose smplx = read_smplx(path);
-      if (set.shape_.empty())
-        set.shape_ = smplx.shapes;  // one person: the first frame's shape is everyone's
-      set_pose(smplx, root_rest_position(*options.body, set.shape_), frame);
+      const ImageSize size = list_images(name);
+      CaptureCamera camera{name, read_camera(extrinsics[key], intrinsics, scale, size)};
+      check_principal_point(camera, intrinsics_path);
+      set_.cameras_.push_back(std::move(camera));
     }
-    set.frames_.push_back(std::move(frame));
-  }
-  if (set.frames_.empty()) throw InputError(directory + ": no frame has both image and pose");
-  if (own && set.frames_.size() != own_frames.size()) {
-    throw InputError(own_path + ": frames: names " + std::to_string(own_frames.size()) +
-                     ", but only " + std::to_string(set.frames_.size()) + " have images");
+    if (set_.cameras_.empty()) throw InputError(set_.directory_ + ": no usable camera");
   }
 
-  for (size_t c = 0; c < set.cameras_.size(); ++c) {
-    set.image_files_.emplace_back();
-    set.mask_files_.emplace_back();
-    for (const CaptureFrame& frame : set.frames_) {
-      const auto missing = [&](const char* folder) {
-        throw InputError((root / folder / set.cameras_[c].name).string() + ": frame " +
-                         frame_label(frame.number) + ": missing");
-      };
-      const auto image = images[c].find(frame.number);
-      const auto mask = masks[c].find(frame.number);
-      if (image == images[c].end()) missing("images_lr");
-      if (mask == masks[c].end()) missing("fmask_lr");
-      set.image_files_.back().push_back(image->second);
-      set.mask_files_.back().push_back(mask->second);
+  // A camera's key is "NUMBER_NAME.png".
+  static CameraNames camera_names(const json& extrinsics, const std::string& path) {
+    if (!extrinsics.is_object()) throw InputError(path + ": not an object of cameras");
+    CameraNames names;
+    for (const auto& [key, value] : extrinsics.items()) {
+      const std::optional<uint32_t> number = leading_number(key);
+      const size_t underscore = key.find('_');
+      if (!number || underscore == std::string::npos || underscore + 1 == key.size())
+        throw InputError(path + ": " + key + ": a camera is called NUMBER_NAME.png");
+      std::string name = key.substr(underscore + 1);
+      if (name.ends_with(".png")) name.resize(name.size() - 4);
+      if (name.find('/') != std::string::npos || name == "..")
+        throw InputError(path + ": " + key + ": not a folder's name");
+      if (!names.emplace(*number, std::pair(key, name)).second)
+        throw InputError(path + ": two cameras of number " + std::to_string(*number));
+    }
+    return names;
+  }
+
+  fs::path image_folder(const std::string& camera) const { return root_ / "images_lr" / camera; }
+
+  // Notes a camera's images and masks; the size of the first image.
+  ImageSize list_images(const std::string& camera) {
+    const fs::path folder = image_folder(camera);
+    images_.push_back(numbered_files(folder.string(), ".jpg"));
+    masks_.push_back(numbered_files((root_ / "fmask_lr" / camera).string(), ".png"));
+    if (images_.back().empty()) throw InputError(folder.string() + ": no images");
+    const std::string first = (folder / images_.back().begin()->second).string();
+    return decode_jpeg_size(map_file(first).bytes(), first);
+  }
+
+  // The images are half the size that the intrinsics speak of: a principal point outside the image
+  // shows data of another size.
+  static void check_principal_point(const CaptureCamera& capture,
+                                    const std::string& intrinsics_path) {
+    const Camera& camera = capture.camera;
+    if (camera.cx_px > 0 && camera.cx_px < camera.width_px && camera.cy_px > 0 &&
+        camera.cy_px < camera.height_px)
+      return;
+    throw InputError(intrinsics_path +
+                     ": intrinsics: principal point, halved, is outside the images of " +
+                     capture.name + " (" + std::to_string(camera.width_px) + "x" +
+                     std::to_string(camera.height_px) + ")");
+  }
+
+  // Frames are the first camera's image numbers that have a pose.
+  void read_frames() {
+    const std::map<uint32_t, JsonField> own_frames =
+        own_ ? list_own_frames() : std::map<uint32_t, JsonField>();
+    for (const auto& [number, file] : images_[0]) {
+      CaptureFrame frame;
+      frame.number = number;
+      const bool posed = own_ ? read_own_pose(own_frames, frame) : read_smplx_pose(frame);
+      if (posed) {
+        set_.frames_.push_back(std::move(frame));
+      } else {
+        ++set_.frames_without_pose_;
+      }
+    }
+    if (set_.frames_.empty())
+      throw InputError(set_.directory_ + ": no frame has both image and pose");
+    if (own_ && set_.frames_.size() != own_frames.size()) {
+      throw InputError(own_path_ + ": frames: names " + std::to_string(own_frames.size()) +
+                       ", but only " + std::to_string(set_.frames_.size()) + " have images");
     }
   }
 
-  // Splits: as marked, or by rule.
-  if (own) {
+  std::map<uint32_t, JsonField> list_own_frames() const {
+    std::map<uint32_t, JsonField> frames;
+    for (const JsonField& frame : about_["frames"].items()) {
+      const uint64_t number = frame["number"].whole();
+      if (number == 0 || number > 999'999'999) frame["number"].fail("out of range");
+      if (!frames.emplace(static_cast<uint32_t>(number), frame).second)
+        frame["number"].fail("stands twice");
+    }
+    return frames;
+  }
+
+  // False if figurine.json does not name this frame.
+  static bool read_own_pose(const std::map<uint32_t, JsonField>& own_frames, CaptureFrame& frame) {
+    const auto found = own_frames.find(frame.number);
+    if (found == own_frames.end()) return false;
+    const JsonField& field = found->second;
+    frame.split = parse_split(field["split"]);
+    const std::vector<double> translation = field["root_translation_m"].numbers(3);
+    for (int i = 0; i < 3; ++i) frame.root_translation_m[i] = static_cast<float>(translation[i]);
+    for (double q : field["rotations"].numbers(kSmplxJoints * 4))
+      frame.rotations.push_back(static_cast<float>(q));
+    throw_if_error(validate_pose(frame.pose(), kSmplxJoints), field["rotations"].where());
+    return true;
+  }
+
+  // False if the data set has no pose of this frame. The person's shape is the first frame's.
+  bool read_smplx_pose(CaptureFrame& frame) {
+    const uint32_t index = frame.number / kFrameStep;
+    if (frame.number % kFrameStep != 0 || index == 0) return false;
+    const std::string digits = std::to_string(index - 1);
+    const std::string file =
+        std::string(6 - std::min<size_t>(6, digits.size()), '0') + digits + ".json";
+    const std::string path = (root_ / "smplx" / "smpl" / file).string();
+    if (!fs::exists(path)) return false;
+    const SmplxPose smplx = read_smplx(path);
+    if (set_.shape_.empty()) set_.shape_ = smplx.shapes;
+    set_pose(smplx, root_rest_position(*options_.body, set_.shape_), frame);
+    return true;
+  }
+
+  // Image and mask of every frame and camera.
+  void match_files() {
+    for (size_t c = 0; c < set_.cameras_.size(); ++c) {
+      std::vector<std::string>& image_files = set_.image_files_.emplace_back();
+      std::vector<std::string>& mask_files = set_.mask_files_.emplace_back();
+      for (const CaptureFrame& frame : set_.frames_) {
+        const auto file_of = [&](const NumberedFiles& files, const char* folder) {
+          const auto found = files.find(frame.number);
+          if (found != files.end()) return found->second;
+          throw InputError((root_ / folder / set_.cameras_[c].name).string() + ": frame " +
+                           frame_label(frame.number) + ": missing");
+        };
+        image_files.push_back(file_of(images_[c], "images_lr"));
+        mask_files.push_back(file_of(masks_[c], "fmask_lr"));
+      }
+    }
+  }
+
+  void take_marked_split() {
     std::set<std::string> held_out;
-    for (const JsonField& name : about["held_out_cameras"].items()) held_out.insert(name.text());
-    for (CaptureCamera& camera : set.cameras_) camera.held_out = held_out.erase(camera.name) != 0;
+    for (const JsonField& name : about_["held_out_cameras"].items()) held_out.insert(name.text());
+    for (CaptureCamera& camera : set_.cameras_) camera.held_out = held_out.erase(camera.name) != 0;
     if (!held_out.empty())
-      about["held_out_cameras"].fail("no camera is called '" + *held_out.begin() + "'");
-  } else {
-    const Split split = default_split(static_cast<uint32_t>(set.frames_.size()),
-                                      static_cast<uint32_t>(set.cameras_.size()));
-    for (size_t f = 0; f < set.frames_.size(); ++f) set.frames_[f].split = split.frames[f];
-    for (size_t c = 0; c < set.cameras_.size(); ++c)
-      set.cameras_[c].held_out = split.held_out_camera[c];
+      about_["held_out_cameras"].fail("no camera is called '" + *held_out.begin() + "'");
   }
-  return set;
+
+  void split_by_rule() {
+    const Split split = default_split(static_cast<uint32_t>(set_.frames_.size()),
+                                      static_cast<uint32_t>(set_.cameras_.size()));
+    for (size_t f = 0; f < set_.frames_.size(); ++f) set_.frames_[f].split = split.frames[f];
+    for (size_t c = 0; c < set_.cameras_.size(); ++c)
+      set_.cameras_[c].held_out = split.held_out_camera[c];
+  }
+
+  const fs::path root_;
+  const DatasetOptions& options_;
+  const std::string own_path_;
+  const bool own_;  // made by figurine-train capture
+  const json own_json_;
+  const JsonField about_;
+  std::vector<NumberedFiles> images_, masks_;  // [V]
+  Dataset set_;
+};
+
+Dataset Dataset::open(const std::string& directory, const DatasetOptions& options) {
+  if (!fs::is_directory(directory)) throw InputError(directory + ": no such folder");
+  return Reading(directory, options).run();
 }
 
 Role Dataset::role(size_t frame, size_t camera) const {

@@ -127,6 +127,8 @@ class Dataset {
   std::string mask_path(size_t frame, size_t camera) const;
 
  private:
+  class Reading;  // what open() does, step by step
+
   Dataset() = default;
 
   std::string directory_;

@@ -95,19 +95,10 @@ void QuantisedSampler::take_what_members_share(const Population& population) {
                        "'; a sampler needs one for all");
     }
   }
-  sampler_.body_name = population.body_name, sampler_.body_hash = population.body_hash;
-  sampler_.preset = population.preset;
-  sampler_.template_mode = population.template_mode;
-  sampler_.fourier_octaves = population.fourier_octaves;
-  sampler_.network = population.network;
+  sampler_.kind() = population.kind();
   for (Layer& layer : sampler_.network.layers) layer.weights = layer.bias = {};
   sampler_.shape_count = static_cast<uint32_t>(population.shape.size() / population.size());
-  sampler_.map_statistics = first->map_statistics;
-  sampler_.decoding = first->decoding;
-  sampler_.golden = first->golden;
-  sampler_.golden.png = {};
-  sampler_.golden.fixed_point_hash = {0, 0};
-  sampler_.golden.fixed_point_library.clear();
+  sampler_.traits() = first->traits();  // a member's golden frame has no picture
   if (population.pose_joints.empty()) return;
   pooled_pose_statistics(population, pose_mean_, pose_covariance_);
   sampler_.pose_statistics = {population.pose_joints, pose_mean_, pose_covariance_};

@@ -199,27 +199,28 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   const std::vector<std::byte> png =
       options.golden && options.float_weights ? golden_png(avatar, view) : std::vector<std::byte>{};
 
-  Avatar content{.name = options.name.empty()
-                             ? std::filesystem::path(avatar.data().directory()).filename().string()
-                             : options.name,
-                 .body_name = avatar.body().name,
-                 .body_hash = avatar.body_file().package.content_hash(),
-                 .preset = settings.preset,
-                 .template_mode = settings.template_mode,
-                 .shape = avatar.model().shape(),
-                 .map_statistics = {},
-                 .fourier_octaves = settings.fourier_octaves,
-                 .decoding = settings.decoding,
-                 .network = network,
-                 .fixed_point = options.fixed_point,
-                 .pose_statistics = {features.joints, features.mean, features.covariance},
-                 .golden = {.root_translation_m = view.pose.root_translation_m,
-                            .rotations = view.pose.rotations,
-                            .camera = view.camera,
-                            .background = kGoldenBackground,
-                            .png = {reinterpret_cast<const uint8_t*>(png.data()), png.size()},
-                            .fixed_point_hash = options.fixed_point_hash,
-                            .fixed_point_library = options.fixed_point_library}};
+  Avatar content;
+  content.kind() = {.body_name = avatar.body().name,
+                    .body_hash = avatar.body_file().package.content_hash(),
+                    .preset = settings.preset,
+                    .template_mode = settings.template_mode,
+                    .fourier_octaves = settings.fourier_octaves,
+                    .network = network};
+  content.traits() = {.map_statistics = {},
+                      .decoding = settings.decoding,
+                      .golden = {.root_translation_m = view.pose.root_translation_m,
+                                 .rotations = view.pose.rotations,
+                                 .camera = view.camera,
+                                 .background = kGoldenBackground,
+                                 .png = {reinterpret_cast<const uint8_t*>(png.data()), png.size()},
+                                 .fixed_point_hash = options.fixed_point_hash,
+                                 .fixed_point_library = options.fixed_point_library}};
+  content.name = options.name.empty()
+                     ? std::filesystem::path(avatar.data().directory()).filename().string()
+                     : options.name;
+  content.shape = avatar.model().shape();
+  content.fixed_point = options.fixed_point;
+  content.pose_statistics = {features.joints, features.mean, features.covariance};
   const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
                                 .macs_per_frame = count_macs(network, shapes),
                                 .gaussians = avatar.body().texel_count()};

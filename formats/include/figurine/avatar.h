@@ -1,5 +1,6 @@
 // An avatar: the weights of one pose UNet, how its input is standardised and its head is decoded,
-// and the person's shape.
+// and the person's shape. What avatars have in common with the population that they are members of
+// and with the sampler that draws them is declared here once (AvatarKind, AvatarTraits).
 #pragma once
 
 #include <array>
@@ -58,22 +59,51 @@ struct GoldenFrame {
   // every CPU. Zero: none.
   std::array<uint64_t, 2> fixed_point_hash{0, 0};
   std::string fixed_point_library;  // the network library that the hash was made with, for people
+
+  // Pose and camera alone: what another avatar's golden frame can be made from.
+  GoldenFrame without_picture() const {
+    GoldenFrame frame = *this;
+    frame.png = {};
+    frame.fixed_point_hash = {0, 0};
+    frame.fixed_point_library.clear();
+    return frame;
+  }
 };
 
-struct Avatar {
-  std::string name;
+// What all avatars of a population and all that a sampler draws have in common: the body that they
+// stand on and the network that poses them. An avatar, a population and a sampler each are of a
+// kind (it is their base, so that `avatar.network` stays short); kind() takes over all of it:
+// avatar.kind() = sampler.kind().
+struct AvatarKind {
   std::string body_name;
   std::array<uint64_t, 2> body_hash{0, 0};  // content hash of the body package (low, high)
   std::string preset;                       // for people; the layers decide
   TemplateMode template_mode = TemplateMode::kShaped;
-  std::span<const float> shape;  // [<= S]
-  MapStatistics map_statistics;
   uint32_t fourier_octaves = 0;
+  Network network;
+
+  AvatarKind& kind() { return *this; }
+  const AvatarKind& kind() const { return *this; }
+};
+
+// What goes with one set of weights: how maps enter the network, how its head is decoded, and a
+// frame to test both by. An avatar and a member of a population have their own, a sampler has one
+// for all that it draws.
+struct AvatarTraits {
+  MapStatistics map_statistics;
   HeadDecoding decoding;
-  Network network;                // its float weights may be absent if fixed_point is there
+  GoldenFrame golden;
+
+  AvatarTraits& traits() { return *this; }
+  const AvatarTraits& traits() const { return *this; }
+};
+
+// The network's float weights may be absent if fixed_point is there.
+struct Avatar : AvatarKind, AvatarTraits {
+  std::string name;
+  std::span<const float> shape;   // [<= S]
   FixedPointNetwork fixed_point;  // empty if the package has none
   PoseStatistics pose_statistics;
-  GoldenFrame golden;
 
   // A package holds one or both.
   bool holds(Precision precision) const {

@@ -37,23 +37,16 @@ const char* to_string(DifferenceCoding coding);  // "q8", "f16"
 enum class Split : uint8_t { kTrain, kValidation, kTest };
 const char* to_string(Split split);  // "train", "validation", "test"
 
-struct PopulationMember {
+// Its golden frame is pose and camera; no picture and no hash.
+struct PopulationMember : AvatarTraits {
   std::string name;
   Split split = Split::kTrain;
-  MapStatistics map_statistics;
-  HeadDecoding decoding;
-  GoldenFrame golden;           // pose and camera; no picture and no hash
   std::vector<double> quality;  // one for each of quality_names, NaN where it was not measured
 };
 
-struct Population {
+// The network's weights are the initial ones.
+struct Population : AvatarKind {
   std::string name;
-  std::string body_name;
-  std::array<uint64_t, 2> body_hash{0, 0};
-  std::string preset;
-  TemplateMode template_mode = TemplateMode::kShaped;
-  uint32_t fourier_octaves = 0;
-  Network network;  // its weights are the initial ones
   DifferenceCoding coding = DifferenceCoding::kInt8;
   std::vector<std::string> quality_names;
   std::vector<PopulationMember> members;  // [M]

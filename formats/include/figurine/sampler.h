@@ -54,23 +54,16 @@ struct GoldenSeed {
   std::array<uint64_t, 2> hash{0, 0};
 };
 
-struct Sampler {
+// What all its avatars share: their kind, whose network is layers without weights, and traits,
+// whose golden frame is pose and camera of a sampled avatar's, with no hash and no picture.
+struct Sampler : AvatarKind, AvatarTraits {
   std::string name;
 
-  // What all its avatars share.
-  std::string body_name;
-  std::array<uint64_t, 2> body_hash{0, 0};
-  std::string preset;
-  TemplateMode template_mode = TemplateMode::kShaped;
-  uint32_t fourier_octaves = 0;
-  Network network;           // layers without weights
-  uint32_t shape_count = 0;  // shape coefficients of an avatar; the last token if any
-  MapStatistics map_statistics;
-  HeadDecoding decoding;
+  // All its avatars share these as well.
+  uint32_t shape_count = 0;          // shape coefficients of an avatar; the last token if any
   std::vector<Quantisation> values;  // [layers] of value 0 first, as FixedPointNetwork has them:
                                      // the training members' activation ranges
   PoseStatistics pose_statistics;    // of all training members together
-  GoldenFrame golden;  // pose and camera of a sampled avatar's golden frame; no hash and no picture
 
   // The space of weights. Values of an avatar: per convolution its kernel (OHWI), then its bias;
   // then the shape coefficients.

@@ -62,16 +62,10 @@ struct AvatarSampler::Impl {
       if (!std::isfinite(weight))
         return Status(StatusCode::kCorrupt, "sampling: a weight is not finite");
     }
+    avatar.kind() = sampler.kind();
+    avatar.traits() = sampler.traits();
     avatar.name = sampler.name;
-    avatar.body_name = sampler.body_name, avatar.body_hash = sampler.body_hash;
-    avatar.preset = sampler.preset;
-    avatar.template_mode = sampler.template_mode;
-    avatar.map_statistics = sampler.map_statistics;
-    avatar.fourier_octaves = sampler.fourier_octaves;
-    avatar.decoding = sampler.decoding;
     avatar.pose_statistics = sampler.pose_statistics;
-    avatar.golden = sampler.golden;
-    avatar.network = sampler.network;
     std::span<const float> rest = weights;
     const std::vector<size_t> sizes = sampler_token_sizes(sampler);
     size_t token = 0;

@@ -1,11 +1,11 @@
-#include "formats/src/package_container.h"
+#include "formats/src/package/container.h"
 
 #include <cstring>
 #include <limits>
 #include <set>
 
-#include "formats/src/checksum.h"
-#include "formats/src/package_text.h"
+#include "formats/src/package/checksum.h"
+#include "formats/src/package/text.h"
 
 namespace figurine {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <variant>
 
-#include "formats/src/checksum.h"
-#include "formats/src/package_content.h"
+#include "formats/src/package/checksum.h"
+#include "formats/src/package/content.h"
 
 namespace figurine {
 

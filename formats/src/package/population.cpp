@@ -7,8 +7,8 @@
 #include <set>
 
 #include "figurine/detail/rans.h"
-#include "formats/src/package_content.h"
-#include "formats/src/package_text.h"
+#include "formats/src/package/content.h"
+#include "formats/src/package/text.h"
 
 namespace figurine {
 
@@ -72,8 +72,7 @@ Status read_member_table(const schema::Member& table, size_t quality_count, Popu
     return corrupt("name", "has a '#' in it, which stands between a package and a member");
   if (table.split() > schema::Split::MAX) return unsupported("split", "is unknown");
   out.split = static_cast<Split>(table.split());
-  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), "avatar", out.map_statistics));
-  FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), "avatar", out.decoding));
+  FIG_RETURN_IF_ERROR(read_maps_and_head(table, "avatar", out));
   if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden_view(*table.golden(), out.golden));
   if (const auto* quality = table.quality(); quality != nullptr)
     out.quality.assign(quality->begin(), quality->end());
@@ -217,11 +216,9 @@ Status read_golden_poses(const schema::Population& table, BlobReader& blobs, Pop
 // Each member's head and maps against the network, as an avatar package's.
 Status check_members_fit(const Population& population, const Budget& budget) {
   for (size_t m = 0; m < population.size(); ++m) {
-    const Avatar avatar{.fourier_octaves = population.fourier_octaves,
-                        .decoding = population.members[m].decoding,
-                        .network = population.network};
-    FIG_RETURN_IF_ERROR(check_network_fits(avatar, "avatar", budget)
-                            .within(concatenate({"population.members[", m, "]"})));
+    FIG_RETURN_IF_ERROR(
+        check_network_fits(population, population.members[m].decoding, "avatar", budget)
+            .within(concatenate({"population.members[", m, "]"})));
   }
   return {};
 }
@@ -233,22 +230,13 @@ Status read_population(const schema::Index& index, BlobReader& blobs, const Budg
   const schema::Population& table = *index.content_as_Population();
   Population& out = content.population;
   FIG_RETURN_IF_ERROR(read_text(index.name(), "population.name", layout::kMaxNameBytes, out.name));
-  FIG_RETURN_IF_ERROR(
-      read_text(table.body_name(), "population.body_name", layout::kMaxNameBytes, out.body_name));
-  FIG_RETURN_IF_ERROR(
-      read_text(table.preset(), "population.preset", layout::kMaxNameBytes, out.preset));
-  out.body_hash = {table.body_hash_low(), table.body_hash_high()};
-  if (table.template_mode() > schema::TemplateMode::MAX)
-    return unsupported("population.template_mode", "is unknown");
-  out.template_mode = static_cast<TemplateMode>(table.template_mode());
-  out.fourier_octaves = table.fourier_octaves();
+  FIG_RETURN_IF_ERROR(read_kind(table, "population", out));
   if (table.coding() > schema::DifferenceCoding::MAX)
     return unsupported("population.coding", "is unknown");
   out.coding = static_cast<DifferenceCoding>(table.coding());
   FIG_RETURN_IF_ERROR(read_texts(table.quality_names(), "population.quality_names",
                                  layout::kMaxNameBytes, false, out.quality_names));
   FIG_RETURN_IF_ERROR(read_members(table, content));
-  FIG_RETURN_IF_ERROR(read_layers(*table.network(), out.network));
   FIG_RETURN_IF_ERROR(check_members_fit(out, budget));
   FIG_RETURN_IF_ERROR(read_convolutions(blobs, "initial", BlobReader::kRequired, out.network));
   FIG_RETURN_IF_ERROR(read_differences(blobs, out));

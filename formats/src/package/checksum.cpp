@@ -1,4 +1,4 @@
-#include "formats/src/checksum.h"
+#include "formats/src/package/checksum.h"
 
 // Compiled in, so that a device ships one library less.
 #define XXH_INLINE_ALL

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "figurine/gaussian.h"
-#include "formats/src/package_content.h"
+#include "formats/src/package/content.h"
 
 namespace figurine {
 
@@ -133,10 +133,9 @@ Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, cons
   return validate_fixed_point(network, out);
 }
 
-// Layers, and their weights in float, in fixed point, or both.
-Status read_network(const schema::Avatar& table, BlobReader& blobs, Avatar& out) {
+// In float, in fixed point, or both.
+Status read_weights(const schema::Avatar& table, BlobReader& blobs, Avatar& out) {
   const bool has_fixed_point = table.fixed_point() != nullptr;
-  FIG_RETURN_IF_ERROR(read_layers(*table.network(), out.network));
   FIG_RETURN_IF_ERROR(read_float_weights(blobs, has_fixed_point, out.network));
   return has_fixed_point
              ? read_fixed_point(*table.fixed_point(), blobs, out.network, out.fixed_point)
@@ -145,23 +144,24 @@ Status read_network(const schema::Avatar& table, BlobReader& blobs, Avatar& out)
 
 }  // namespace
 
-Status check_network_fits(const Avatar& avatar, std::string_view owner, const Budget& budget) {
-  const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, false);
-  if (avatar.network.input_size > kMaxUvSize) {
+Status check_network_fits(const AvatarKind& kind, const HeadDecoding& decoding,
+                          std::string_view owner, const Budget& budget) {
+  const std::vector<ValueShape> shapes = *infer_shapes(kind.network, false);
+  if (kind.network.input_size > kMaxUvSize) {
     return over_limit("network.input_size", "is larger than ", kMaxUvSize);
   }
-  if (avatar.fourier_octaves > layout::kMaxFourierOctaves) {
+  if (kind.fourier_octaves > layout::kMaxFourierOctaves) {
     return over_limit(concatenate({owner, ".fourier_octaves"}), "is above ",
                       layout::kMaxFourierOctaves);
   }
-  if (const uint32_t channels = kMapChannels + 4 * avatar.fourier_octaves;
-      avatar.network.input_channels != channels) {
-    return corrupt("network.input_channels", "is ", avatar.network.input_channels,
+  if (const uint32_t channels = kMapChannels + 4 * kind.fourier_octaves;
+      kind.network.input_channels != channels) {
+    return corrupt("network.input_channels", "is ", kind.network.input_channels,
                    ", maps and Fourier channels make ", channels);
   }
-  if (shapes.back().size != avatar.network.input_size)
+  if (shapes.back().size != kind.network.input_size)
     return corrupt("network", "the result does not have the size of the input");
-  if (const uint32_t channels = head_channels(avatar.decoding.sh_degree);
+  if (const uint32_t channels = head_channels(decoding.sh_degree);
       shapes.back().channels != channels) {
     return corrupt("network", "the result has ", shapes.back().channels,
                    " channels, the head needs ", channels);
@@ -177,12 +177,12 @@ Status check_network_fits(const Avatar& avatar, std::string_view owner, const Bu
     return over_limit("budget.peak_memory_bytes", "declares ", budget.peak_memory_bytes,
                       ", one activation alone needs ", largest_value);
   }
-  if (const uint64_t macs = count_macs(avatar.network, shapes);
+  if (const uint64_t macs = count_macs(kind.network, shapes);
       budget.macs_per_frame != 0 && macs > budget.macs_per_frame) {
     return over_limit("budget.macs_per_frame", "declares ", budget.macs_per_frame,
                       ", the network needs ", macs);
   }
-  if (budget.gaussians > uint64_t{avatar.network.input_size} * avatar.network.input_size) {
+  if (budget.gaussians > uint64_t{kind.network.input_size} * kind.network.input_size) {
     return corrupt("budget.gaussians", "is more than the map has texels");
   }
   return {};
@@ -313,25 +313,16 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
                    Avatar& out) {
   const schema::Avatar& table = *index.content_as_Avatar();
   FIG_RETURN_IF_ERROR(read_text(index.name(), "avatar.name", layout::kMaxNameBytes, out.name));
-  FIG_RETURN_IF_ERROR(
-      read_text(table.body_name(), "avatar.body_name", layout::kMaxNameBytes, out.body_name));
-  FIG_RETURN_IF_ERROR(
-      read_text(table.preset(), "avatar.preset", layout::kMaxNameBytes, out.preset));
-  out.body_hash = {table.body_hash_low(), table.body_hash_high()};
-  if (table.template_mode() > schema::TemplateMode::MAX)
-    return unsupported("avatar.template_mode", "is unknown");
-  out.template_mode = static_cast<TemplateMode>(table.template_mode());
+  FIG_RETURN_IF_ERROR(read_kind(table, "avatar", out));
   FIG_RETURN_IF_ERROR(
       blobs.read("avatar.shape", {BlobReader::kAny}, out.shape, BlobReader::kMayBeAbsent));
   if (out.shape.size() > kMaxShapeCoefficients) {
     return over_limit("avatar.shape", "has more than ", kMaxShapeCoefficients, " coefficients");
   }
   FIG_RETURN_IF_ERROR(check_magnitude(out.shape, "avatar.shape", 1000));
-  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), "avatar", out.map_statistics));
-  out.fourier_octaves = table.fourier_octaves();
-  FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), "avatar", out.decoding));
-  FIG_RETURN_IF_ERROR(read_network(table, blobs, out));
-  FIG_RETURN_IF_ERROR(check_network_fits(out, "avatar", budget));
+  FIG_RETURN_IF_ERROR(read_maps_and_head(table, "avatar", out));
+  FIG_RETURN_IF_ERROR(read_weights(table, blobs, out));
+  FIG_RETURN_IF_ERROR(check_network_fits(out, out.decoding, "avatar", budget));
   if (table.pose_statistics() != nullptr) {
     FIG_RETURN_IF_ERROR(
         read_pose_statistics(*table.pose_statistics(), "avatar", blobs, out.pose_statistics));

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/src/package_container.h"
+#include "formats/src/package/container.h"
 
 namespace figurine {
 
@@ -45,11 +45,33 @@ Status read_map_statistics(const schema::MapStatistics& table, std::string_view 
 Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, HeadDecoding& out);
 // Layers and input, no weights; the shapes fit each other.
 Status read_layers(const schema::Network& table, Network& out);
+// Table: schema::Avatar, schema::Population or schema::Sampler, whose fields of one name are one
+// thing. The network has no weights yet.
+template <class Table>
+Status read_kind(const Table& table, std::string_view owner, AvatarKind& out) {
+  FIG_RETURN_IF_ERROR(read_text(table.body_name(), concatenate({owner, ".body_name"}),
+                                layout::kMaxNameBytes, out.body_name));
+  FIG_RETURN_IF_ERROR(read_text(table.preset(), concatenate({owner, ".preset"}),
+                                layout::kMaxNameBytes, out.preset));
+  out.body_hash = {table.body_hash_low(), table.body_hash_high()};
+  if (table.template_mode() > schema::TemplateMode::MAX)
+    return unsupported(concatenate({owner, ".template_mode"}), "is unknown");
+  out.template_mode = static_cast<TemplateMode>(table.template_mode());
+  out.fourier_octaves = table.fourier_octaves();
+  return read_layers(*table.network(), out.network);
+}
+// Table: schema::Avatar, schema::Member or schema::Sampler. The golden frame is the caller's.
+template <class Table>
+Status read_maps_and_head(const Table& table, std::string_view owner, AvatarTraits& out) {
+  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), owner, out.map_statistics));
+  return read_decoding(*table.decoding(), owner, out.decoding);
+}
 // "prefix.i.weights" and "prefix.i.bias" of every convolution, finite.
 Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader::Presence presence,
                          Network& out);
 // The network against maps, head and budget; the avatar's weights are not looked at.
-Status check_network_fits(const Avatar& avatar, std::string_view owner, const Budget& budget);
+Status check_network_fits(const AvatarKind& kind, const HeadDecoding& decoding,
+                          std::string_view owner, const Budget& budget);
 // The listed joints of pose statistics: 1 to 255, none twice.
 Status read_statistics_joints(const flatbuffers::Vector<uint8_t>& list, const std::string& field,
                               std::vector<uint8_t>& out);

@@ -1,4 +1,4 @@
-#include "formats/src/package_text.h"
+#include "formats/src/package/text.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -2,7 +2,7 @@
 // weights that are weights.
 #include <cmath>
 
-#include "formats/src/package_content.h"
+#include "formats/src/package/content.h"
 
 namespace figurine {
 

@@ -9,8 +9,8 @@
 #include <limits>
 #include <numeric>
 
-#include "formats/src/package_content.h"
-#include "formats/src/package_text.h"
+#include "formats/src/package/content.h"
+#include "formats/src/package/text.h"
 
 namespace figurine {
 
@@ -34,24 +34,12 @@ Status read_quantisation(const schema::Sampler& table, Sampler& out) {
 
 // What all its avatars share, up to their weights.
 Status read_shared(const schema::Sampler& table, const Budget& budget, Sampler& out) {
-  FIG_RETURN_IF_ERROR(
-      read_text(table.body_name(), "sampler.body_name", layout::kMaxNameBytes, out.body_name));
-  FIG_RETURN_IF_ERROR(
-      read_text(table.preset(), "sampler.preset", layout::kMaxNameBytes, out.preset));
-  out.body_hash = {table.body_hash_low(), table.body_hash_high()};
-  if (table.template_mode() > schema::TemplateMode::MAX)
-    return unsupported("sampler.template_mode", "is unknown");
-  out.template_mode = static_cast<TemplateMode>(table.template_mode());
-  out.fourier_octaves = table.fourier_octaves();
+  FIG_RETURN_IF_ERROR(read_kind(table, "sampler", out));
   out.shape_count = table.shape_count();
   if (out.shape_count > kMaxShapeCoefficients)
     return over_limit("sampler.shape_count", "is above ", kMaxShapeCoefficients);
-  FIG_RETURN_IF_ERROR(read_map_statistics(*table.map_statistics(), "sampler", out.map_statistics));
-  FIG_RETURN_IF_ERROR(read_decoding(*table.decoding(), "sampler", out.decoding));
-  FIG_RETURN_IF_ERROR(read_layers(*table.network(), out.network));
-  const Avatar avatar{
-      .fourier_octaves = out.fourier_octaves, .decoding = out.decoding, .network = out.network};
-  FIG_RETURN_IF_ERROR(check_network_fits(avatar, "sampler", budget));
+  FIG_RETURN_IF_ERROR(read_maps_and_head(table, "sampler", out));
+  FIG_RETURN_IF_ERROR(check_network_fits(out, out.decoding, "sampler", budget));
   return read_quantisation(table, out);
 }
 

@@ -1,9 +1,9 @@
-#include "formats/src/package_content.h"
+#include "formats/src/package/content.h"
 
 #include <cmath>
 #include <set>
 
-#include "formats/src/package_text.h"
+#include "formats/src/package/text.h"
 
 namespace figurine {
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "figurine/package.h"
-#include "formats/src/package_layout.h"
-#include "formats/src/refusal.h"
+#include "formats/src/package/layout.h"
+#include "formats/src/package/refusal.h"
 #include "package_generated.h"
 
 namespace figurine {

@@ -1,4 +1,4 @@
-#include "formats/src/refusal.h"
+#include "formats/src/package/refusal.h"
 
 #include <charconv>
 
