@@ -12,7 +12,7 @@
 //   blends    what a convex blend of few members leaves of a sample (convex_blend.h)
 //
 // Generators that pass need not be good: noise is novel. Held-out members are the row to resemble,
-// generation_baselines.h has the rows to beat.
+// baselines.h has the rows to beat.
 //
 // Based on: Zeng et al., Generative Modeling of Weights: Generalization or Memorization?, 2025
 // (arXiv 2506.07998).

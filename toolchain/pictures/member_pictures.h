@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "figurine/motion.h"
 #include "figurine/package.h"
 #include "toolchain/measure/metrics.h"
 #include "toolchain/train/interrupt.h"
