@@ -6,8 +6,8 @@
 
 #include "ports/media/png.h"
 #include "tests/toolchain/train/small_capture.h"
-#include "toolchain/evaluate/requantization.h"
 #include "toolchain/quantize/calibration.h"
+#include "toolchain/reconstruction/requantization.h"
 #include "toolchain/train/avatar_file.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
@@ -135,7 +135,7 @@ TEST(Population, OfARunCostsLessThanItMay) {
     const train::AvatarFile member = train::open_avatar(path + "#" + capture::identity_name(0));
     std::filesystem::remove(path);  // the map stays
     const nlohmann::json report =
-        evaluate::evaluate_requantization(avatar, member.avatar, {.quiet = true});
+        reconstruction::evaluate_requantization(avatar, member.avatar, {.quiet = true});
     const ParityReport parity = compare_with_runtime(avatar, member.avatar, {.views = 6});
     const double loss_db = report.at("poses").at("loss_db");
     std::printf("%s: %zu bytes, loss %.4f dB, to the run's own pictures %.1f dB\n",

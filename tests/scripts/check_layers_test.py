@@ -1,6 +1,7 @@
 """Each rule of scripts/check_layers, broken once in an otherwise sound tree, must be caught and
 named; the sound tree must pass."""
 import pathlib
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -41,7 +42,9 @@ SOUND = {
         'void f() { try { throw 1; } catch (int) {} }\n'),
     "toolchain/capture/render.cpp": (
         '#include <embree4/rtcore.h>\n#include <jpeglib.h>\n'
-        '#include "toolchain/model/unet.h"\n'),
+        '#include "toolchain/body/skin.h"\n'),
+    "toolchain/body/skin.h": '#include "toolchain/error.h"\n',
+    "toolchain/error.h": "#include <stdexcept>\n",
     "toolchain/model/unet.h": '#include <Eigen/Dense>\n',
     "toolchain/verify/parity.cpp": '#include "figurine/renderer.h"\n',
     "toolchain/cli/main.cpp": '#include <CLI/CLI.hpp>\n#include "toolchain/model/unet.h"\n',
@@ -113,6 +116,12 @@ BREACHES = [  # (file, its text, words that the report must hold)
     ("toolchain/model/a.cpp", '#include <embree4/rtcore.h>\n',
      "embree4/rtcore.h: only in toolchain/capture"),
     ("toolchain/model/a.cpp", '#include <png.h>\n', "png.h: only in"),
+    ("toolchain/body/a.cpp", '#include "toolchain/model/unet.h"\n',
+     "an arrow up: toolchain/body may not use toolchain/model/unet.h"),
+    ("toolchain/model/a.h", '#include "../verify/parity.cpp"\n',
+     "an arrow up: toolchain/model may not use toolchain/verify"),
+    ("toolchain/evaluate/a.cpp", "", "its folder has no row in ROOMS"),
+    ("runtime/src/cache/a.cpp", "", "its folder has no row in ROOMS"),
     ("toolchain/model/a.cpp", '#include <CLI/CLI.hpp>\n', "CLI/CLI.hpp: only in"),
     ("toolchain/verify/a.cpp", '#include "samples/figurine/main.cpp"\n',
      "toolchain/verify may not use samples"),
@@ -140,6 +149,12 @@ class CheckLayers(unittest.TestCase):
 
     def test_an_empty_tree_is_a_failure(self):
         self.assertEqual(check({})[0], 1)
+
+    def test_finds_a_loop_in_its_own_table(self):
+        find_loop = runpy.run_path(str(CHECKER))["find_loop"]
+        self.assertEqual(find_loop({"a": [], "b": ["a", "a/word.h"], "c": ["b", "a"]}), [])
+        self.assertEqual(find_loop({"a": ["b"], "b": ["c", "d"], "c": [], "d": ["b"]}),
+                         ["b", "d", "b"])
 
     def test_names_every_breach(self):
         for name, text, words in BREACHES:

@@ -5,53 +5,26 @@
 #include <cmath>
 
 #include "figurine/check.h"
+#include "toolchain/random/split_mix.h"
 
 namespace figurine::body {
-namespace {
-
-// SplitMix64 (Steele, Lea, Flood, 2014): a counter through a bijective mixer, so that person i
-// needs no person before it.
-uint64_t mix(uint64_t z) {
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
-
-class Random {
- public:
-  explicit Random(uint64_t seed) : state_(mix(seed + 0x9e3779b97f4a7c15u)) {}
-  double uniform() {
-    return static_cast<double>(mix(state_ += 0x9e3779b97f4a7c15u) >> 11) * 0x1p-53;
-  }
-  double uniform(double low, double high) { return low + (high - low) * uniform(); }
-  // Sum of 12 uniforms: close to normal, within +-6, and free of libm.
-  double normal() {
-    double sum = -6;
-    for (int i = 0; i < 12; ++i) sum += uniform();
-    return sum;
-  }
-
- private:
-  uint64_t state_;
-};
-
-}  // namespace
+namespace {}  // namespace
 
 MacroShape sample_macro_shape(uint64_t seed) {
-  Random random(seed);
+  random::SplitMix random(random::mix_bits(seed + random::kWeylStep));
   MacroShape shape;
   const double androgyny = random.uniform(0, 0.3);
-  shape.gender = static_cast<float>(random.uniform() < 0.5 ? androgyny : 1 - androgyny);
+  shape.gender = static_cast<float>(random.unit() < 0.5 ? androgyny : 1 - androgyny);
   shape.age_years = static_cast<float>(random.uniform(25, 75));
   shape.muscle = static_cast<float>(random.uniform(0.25, 0.85));
   shape.weight = static_cast<float>(random.uniform(0.2, 0.85));
   // The sculpted extremes are 0.37 m below and 0.72 m above the average: 7 cm are 0.095 of the way
   // down and 0.049 of the way up.
-  const double z = std::clamp(random.normal(), -2.5, 2.5);
+  const double z = std::clamp(random.nearly_normal(), -2.5, 2.5);
   shape.height = static_cast<float>(0.5 + z * (z < 0 ? 0.095 : 0.049));
   // Cubes make mixtures with one clear majority common and pure ones rare.
   for (float* share : {&shape.african, &shape.asian, &shape.caucasian}) {
-    const double u = random.uniform();
+    const double u = random.unit();
     *share = static_cast<float>(u * u * u);
   }
   return shape;

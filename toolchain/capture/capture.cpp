@@ -13,13 +13,16 @@
 #include "toolchain/body/surface.h"
 #include "toolchain/capture/layout.h"
 #include "toolchain/capture/person.h"
-#include "toolchain/capture/random.h"
 #include "toolchain/capture/renderer.h"
 #include "toolchain/capture/sequence.h"
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/error.h"
+#include "toolchain/random/counter.h"
 
 namespace figurine::capture {
+
+using random::CounterRandom;
+
 namespace {
 
 constexpr uint64_t kIdentityStream = 4;
@@ -166,7 +169,7 @@ void photograph(const Session& session, const IdentityLayout& layout, const Body
 }  // namespace
 
 uint64_t person_seed(uint64_t seed, uint32_t identity) {
-  return Random(seed, kIdentityStream).bits(identity);
+  return CounterRandom(seed, kIdentityStream).bits(identity);
 }
 
 std::string identity_name(uint32_t identity) {

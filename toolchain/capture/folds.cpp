@@ -5,9 +5,12 @@
 #include <map>
 
 #include "toolchain/body/surface.h"
-#include "toolchain/capture/random.h"
+#include "toolchain/random/counter.h"
 
 namespace figurine::capture {
+
+using random::CounterRandom;
+
 namespace {
 
 constexpr uint64_t kPlaceStream = 1, kSizeStream = 2;
@@ -103,7 +106,7 @@ void FoldPattern::place_creases(const Mesh& mesh, const std::vector<float>& norm
     area_until.push_back(area += double{length(normal)} / 2);
   }
   if (!(area > 0)) return;
-  const Random place(seed, kPlaceStream), size(seed, kSizeStream);
+  const CounterRandom place(seed, kPlaceStream), size(seed, kSizeStream);
   const float spacing_m = kSpacing * style_.wavelength_m;
   const auto darts = static_cast<uint64_t>(4 * area / double{spacing_m * spacing_m});
   // Darts that landed, by boxes of one spacing: only the 27 around a dart can be too near.

@@ -14,8 +14,12 @@
 #include "toolchain/capture/proxy.h"
 #include "toolchain/capture/wardrobe.h"
 #include "toolchain/error.h"
+#include "toolchain/random/counter.h"
 
 namespace figurine::capture {
+
+using random::CounterRandom;
+
 namespace {
 
 // Streams of a person's seed.
@@ -174,7 +178,7 @@ ShapeFit fit_shape(const Body& body, const body::Surface& surface,
 Person make_makehuman_person(const PersonRequest& request, const body::MakeHuman& makehuman,
                              const std::string& directory, const Body& body) {
   const body::MacroShape shape =
-      body::sample_macro_shape(Random(request.seed, kShapeStream).bits(0) >> 32);
+      body::sample_macro_shape(CounterRandom(request.seed, kShapeStream).bits(0) >> 32);
   const Outfit outfit = choose_outfit(request.seed, shape, request.limits);
 
   const std::vector<float> vertices_m = makehuman.vertices(shape);
@@ -182,7 +186,7 @@ Person make_makehuman_person(const PersonRequest& request, const body::MakeHuman
   Mesh& garment = dresser.add_garment(*outfit.garment, outfit, Surfacing::kCloth);
   garment.fold_strength = cloth_strength(garment);
   garment.folds = std::make_shared<FoldPattern>(garment, outfit.garment->folds,
-                                                Random(request.seed, kFoldStream).bits(0));
+                                                CounterRandom(request.seed, kFoldStream).bits(0));
   const bool barefoot = !dresser.feet_covered();
   if (barefoot) {
     Mesh& shoes = dresser.add_garment(*outfit.shoes, outfit, Surfacing::kLeather);
@@ -288,7 +292,7 @@ Person make_mannequin_person(const PersonRequest& request, const Body& body) {
   if (!request.limits.empty())
     throw InputError(
         "--outfit, --skin, --hair and their exclusions: the mannequin has no wardrobe");
-  const Random shape(request.seed, kShapeStream), wardrobe(request.seed, kWardrobeStream);
+  const CounterRandom shape(request.seed, kShapeStream), wardrobe(request.seed, kWardrobeStream);
   Person person;
   for (uint32_t s = 0; s < model.shape_count; ++s)
     person.shape.push_back(static_cast<float>(std::clamp(shape.normal(s), -1.5, 1.5)));
@@ -326,8 +330,8 @@ Person make_mannequin_person(const PersonRequest& request, const Body& body) {
   mesh.material.colour = colour_texture(image);
   mesh.material.surfacing = Surfacing::kCloth;
   mesh.fold_strength = cloth_strength(mesh);
-  mesh.folds =
-      std::make_shared<FoldPattern>(mesh, FoldStyle{}, Random(request.seed, kFoldStream).bits(0));
+  mesh.folds = std::make_shared<FoldPattern>(mesh, FoldStyle{},
+                                             CounterRandom(request.seed, kFoldStream).bits(0));
   person.meshes.push_back(std::move(mesh));
   person.shape.resize(std::max<size_t>(person.shape.size(), body.shape_count()), 0.0f);
   person.description = {{"body", "mannequin"}};

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "toolchain/capture/random.h"
 #include "toolchain/error.h"
+#include "toolchain/random/counter.h"
 
 namespace figurine::capture {
+
+using random::CounterRandom;
+
 namespace {
 
 // Turns from one pose to the next. Not the golden ratio: its multiples of 13 nearly close the
@@ -34,7 +37,7 @@ std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& mot
   const uint32_t distance = has_block ? std::min({kBlockDistance, total / 10, spare / 2}) : 0;
   const uint32_t length = total - 2 * distance;  // without the two gaps
 
-  const double start = Random(options.seed, kHeadingStream).unit(0);
+  const double start = CounterRandom(options.seed, kHeadingStream).unit(0);
   std::vector<CapturedPose> sequence;
   double block_heading = 0;
   bool after_block = false;

@@ -4,8 +4,12 @@
 #include <array>
 
 #include "toolchain/error.h"
+#include "toolchain/random/counter.h"
 
 namespace figurine::capture {
+
+using random::CounterRandom;
+
 namespace {
 
 // Fractions of the 512-pixel textures.
@@ -109,7 +113,7 @@ const std::vector<Dye>& dyes_of(Fabric fabric) {
 }
 
 template <class T>
-const T& pick(const std::vector<T>& from, const Random& random, uint64_t choice) {
+const T& pick(const std::vector<T>& from, const CounterRandom& random, uint64_t choice) {
   return from[random.index(choice, from.size())];
 }
 
@@ -176,7 +180,7 @@ void require_known(const WardrobeLimits& limits) {
 
 // The colours that came after the wardrobe: of cloths, skin, hair and eyes, each in its plausible
 // range.
-void choose_colours(const Random& random, const body::MacroShape& shape,
+void choose_colours(const CounterRandom& random, const body::MacroShape& shape,
                     const std::string& ancestry, Outfit& outfit) {
   for (size_t f = 0; f < kFabrics; ++f) {
     const uint64_t counter = kFirstFabric + 4 * f;
@@ -339,7 +343,7 @@ const std::vector<Skin>& skins() {
 
 namespace {
 
-const Garment* choose_garment(const Random& first, const Random& again, bool male,
+const Garment* choose_garment(const CounterRandom& first, const CounterRandom& again, bool male,
                               const WardrobeLimits& limits) {
   const Garment* own = &pick(garments_for(male), first, kGarment);
   const auto left = allowed(garments_for(male), limits.outfits, limits.excluded_outfits, "outfit",
@@ -350,7 +354,7 @@ const Garment* choose_garment(const Random& first, const Random& again, bool mal
 
 // Where the person's own skin is not allowed, one of the same sex that looks most alike: age and
 // tone before tone before any.
-Skin choose_skin(const Skin& own, const Random& again, const WardrobeLimits& limits) {
+Skin choose_skin(const Skin& own, const CounterRandom& again, const WardrobeLimits& limits) {
   std::vector<Skin> of_sex;
   for (const Skin& skin : skins()) {
     if (skin.male == own.male) of_sex.push_back(skin);
@@ -372,7 +376,7 @@ Skin choose_skin(const Skin& own, const Random& again, const WardrobeLimits& lim
 
 Outfit choose_outfit(uint64_t seed, const body::MacroShape& shape, const WardrobeLimits& limits) {
   require_known(limits);
-  const Random random(seed, kWardrobeStream), again(seed, kLimitStream);
+  const CounterRandom random(seed, kWardrobeStream), again(seed, kLimitStream);
   const bool male = shape.gender >= 0.5f;
   Outfit outfit;
   outfit.garment = choose_garment(random, again, male, limits);
@@ -423,7 +427,7 @@ Outfit choose_outfit(uint64_t seed, const body::MacroShape& shape, const Wardrob
   outfit.dye_turn_rad = static_cast<float>(random.uniform(kDyeTurn, -3.14159, 3.14159));
   outfit.dye_saturation = static_cast<float>(random.uniform(kDyeSaturation, 0.4, 0.75));
   outfit.dye_value = static_cast<float>(random.uniform(kDyeValue, 0.9, 1.3));
-  choose_colours(Random(seed, kColourStream), shape, ancestry, outfit);
+  choose_colours(CounterRandom(seed, kColourStream), shape, ancestry, outfit);
   return outfit;
 }
 

@@ -12,7 +12,6 @@
 
 #include "toolchain/body/makehuman.h"
 #include "toolchain/capture/mesh.h"
-#include "toolchain/capture/random.h"
 #include "toolchain/capture/texture.h"
 
 namespace figurine::capture {

@@ -15,10 +15,10 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/contact_sheet.h"
-#include "toolchain/evaluate/quantization.h"
-#include "toolchain/evaluate/reconstruction.h"
-#include "toolchain/evaluate/requantization.h"
+#include "toolchain/pictures/contact_sheet.h"
+#include "toolchain/reconstruction/quantization.h"
+#include "toolchain/reconstruction/reconstruction.h"
+#include "toolchain/reconstruction/requantization.h"
 #include "toolchain/train/avatar_file.h"
 #include "toolchain/train/threads.h"
 #include "toolchain/verify/parity.h"
@@ -29,10 +29,10 @@ namespace {
 
 struct EvaluateArguments {
   train::OpenRunOptions open;
-  evaluate::ReconstructionOptions reconstruction;
+  reconstruction::ReconstructionOptions reconstruction;
   verify::ParityOptions parity;
-  evaluate::QuantizationOptions quantization;
-  evaluate::RequantizationOptions requantization;
+  reconstruction::QuantizationOptions quantization;
+  reconstruction::RequantizationOptions requantization;
   quantize::FineTuneOptions fine_tune;
   bool no_qat = false;
   std::vector<std::string> runs, packages;  // of quantization and population
@@ -69,9 +69,9 @@ void print_group(const char* title, const nlohmann::json& group) {
 void run_reconstruction(const EvaluateArguments& arguments) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
   nlohmann::json report = report_head(arguments, avatar);
-  report.update(evaluate::evaluate_reconstruction(avatar, arguments.reconstruction));
+  report.update(reconstruction::evaluate_reconstruction(avatar, arguments.reconstruction));
   if (!arguments.sheet.empty()) {
-    const ports::ImageU8 sheet = evaluate::make_contact_sheet(avatar, {});
+    const ports::ImageU8 sheet = pictures::make_contact_sheet(avatar, {});
     throw_if_error(ports::write_file_atomically(
                        arguments.sheet, value_or_throw(ports::encode_png(sheet), arguments.sheet)),
                    "cannot save");
@@ -124,7 +124,7 @@ void run_quantization(const EvaluateArguments& arguments) {
   if (!arguments.packages.empty() && arguments.packages.size() != arguments.runs.size()) {
     throw InputError("--package: one for every --run, in the same order");
   }
-  evaluate::QuantizationOptions options = arguments.quantization;
+  reconstruction::QuantizationOptions options = arguments.quantization;
   if (!arguments.no_qat) {
     options.fine_tune = arguments.fine_tune;
     options.fine_tune->calibration = options.calibration;
@@ -136,11 +136,11 @@ void run_quantization(const EvaluateArguments& arguments) {
     train::OpenRunOptions open = arguments.open;
     open.run = arguments.runs[i];
     train::TrainedAvatar avatar = train::TrainedAvatar::open(open);
-    reports.push_back(evaluate::evaluate_quantization(avatar, {open.run}, options));
+    reports.push_back(reconstruction::evaluate_quantization(avatar, {open.run}, options));
     if (!arguments.packages.empty())
       reports.back()["package_bytes"] = std::filesystem::file_size(arguments.packages[i]);
   }
-  nlohmann::json report = evaluate::summarise_quantization(reports);
+  nlohmann::json report = reconstruction::summarise_quantization(reports);
   if (!arguments.packages.empty()) report["package_bytes"] = reports.front().at("package_bytes");
   report["command"] = train::current_command();
   report["commit"] = train::current_commit();
@@ -166,7 +166,8 @@ void run_population(const EvaluateArguments& arguments) {
     const std::string name = std::filesystem::path(avatar.data().directory()).filename().string();
     const train::AvatarFile member = train::open_avatar(arguments.package + "#" + name);
     nlohmann::json row{{"member", name}, {"run", run}};
-    row.update(evaluate::evaluate_requantization(avatar, member.avatar, arguments.requantization));
+    row.update(
+        reconstruction::evaluate_requantization(avatar, member.avatar, arguments.requantization));
     report["coding"] = to_string(member.file.package.population().coding);
     report["package_bytes"] = member.file.package.size_bytes();
     report["package_hash"] = format_hash(member.file.package.content_hash());

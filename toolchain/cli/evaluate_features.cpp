@@ -9,7 +9,7 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/retrieval.h"
+#include "toolchain/features/retrieval.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"
@@ -20,8 +20,8 @@ namespace {
 
 struct FeaturesArguments {
   std::string population, body, motion, output;
-  evaluate::NetworkFiles files;
-  evaluate::RetrievalOptions options;
+  features::NetworkFiles files;
+  features::RetrievalOptions options;
 };
 
 void print_found(const char* part, const nlohmann::json& found) {
@@ -56,7 +56,7 @@ void print_report(const nlohmann::json& report) {
 }
 
 void run(const FeaturesArguments& arguments) {
-  const evaluate::ComparingNetworks networks = evaluate::open_networks(arguments.files);
+  const features::ComparingNetworks networks = features::open_networks(arguments.files);
   if (networks.features.empty() && networks.perceptual.empty()) {
     throw InputError("no network: give --features, --lpips or --inception");
   }
@@ -64,7 +64,7 @@ void run(const FeaturesArguments& arguments) {
       train::open_package(arguments.population, PackageKind::kPopulation);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   std::optional<train::PackageFile> motion;
-  evaluate::RetrievalOptions options = arguments.options;
+  features::RetrievalOptions options = arguments.options;
   if (!arguments.motion.empty()) {
     motion.emplace(train::open_package(arguments.motion, PackageKind::kMotion));
     throw_if_error(check_motion_fits_body(motion->package.motion(), body.package.body()),
@@ -77,7 +77,7 @@ void run(const FeaturesArguments& arguments) {
                         {"date", train::utc_now()},
                         {"package", arguments.population},
                         {"package_hash", format_hash(population.package.content_hash())}};
-  report.update(evaluate::evaluate_networks(population.package, body.package, networks, options));
+  report.update(features::evaluate_networks(population.package, body.package, networks, options));
   train::write_json(arguments.output, report);
   if (!options.quiet) print_report(report);
 }

@@ -16,11 +16,11 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/captured_people.h"
-#include "toolchain/evaluate/generation.h"
-#include "toolchain/evaluate/member_sheets.h"
-#include "toolchain/evaluate/retrieval.h"
+#include "toolchain/features/retrieval.h"
 #include "toolchain/generate/sampler_trainer.h"
+#include "toolchain/generation/captured_people.h"
+#include "toolchain/generation/generation.h"
+#include "toolchain/members/member_sheets.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"
@@ -40,8 +40,8 @@ struct GenerationArguments {
   std::string population, body, output, sheet, recipe, makehuman;
   std::vector<std::string> runs, samplers;
   verify::DrawOptions draw;
-  evaluate::GenerationOptions options;
-  evaluate::NetworkFiles networks;
+  generation::GenerationOptions options;
+  features::NetworkFiles networks;
   size_t rank = 64;
   uint32_t threads = 1;
   bool quiet = false, baselines = true;
@@ -183,13 +183,13 @@ class Samplers {
   }
 
   // As many people of each as either part of the set has.
-  void draw(const evaluate::MemberSet& set) {
+  void draw(const members::MemberSet& set) {
     const size_t count = std::max(set.training.size(), set.held_out.size());
     for (const NamedPackage& package : packages_) draw_package(package, set, count);
     for (const std::string& text : arguments_.runs) draw_run(text, set, count);
   }
 
-  std::vector<evaluate::Generated> generated;
+  std::vector<generation::Generated> generated;
   nlohmann::json about = nlohmann::json::array();
 
  private:
@@ -199,11 +199,11 @@ class Samplers {
   };
 
   // With the device's own integers.
-  void draw_package(const NamedPackage& named, const evaluate::MemberSet& set, size_t count) {
+  void draw_package(const NamedPackage& named, const members::MemberSet& set, size_t count) {
     const Package& package = named.file.package;
     const Sampler& sampler = package.sampler();
     const double start = now_s();
-    const evaluate::RowMatrix weights =
+    const measure::RowMatrix weights =
         verify::sample_weights(sampler, {.first_seed = arguments_.draw.first_seed,
                                          .count = count,
                                          .steps = arguments_.draw.steps,
@@ -232,14 +232,14 @@ class Samplers {
     return members;
   }
 
-  void draw_run(const std::string& text, const evaluate::MemberSet& set, size_t count) {
+  void draw_run(const std::string& text, const members::MemberSet& set, size_t count) {
     const auto [name, path] = named_path(text);
     const generate::TrainedSampler sampler =
         generate::TrainedSampler::open(path, arguments_.population);
     verify::DrawOptions draw = arguments_.draw;
     draw.count = count;
     const double start = now_s();
-    const evaluate::RowMatrix weights = verify::draw_weights(sampler, draw);
+    const measure::RowMatrix weights = verify::draw_weights(sampler, draw);
     const double seconds = (now_s() - start) / static_cast<double>(count);
     generated.push_back({name, set.standardisation.standardise(weights), sampler.settings.members});
     tell(name, seconds, train::read_json(train::RunDirectory{path}.run_json()));
@@ -265,27 +265,27 @@ class Samplers {
 
 void run_generation(const GenerationArguments& arguments) {
   train::use_threads(arguments.threads);
-  evaluate::GenerationOptions options = arguments.options;
-  options.networks = evaluate::open_networks(arguments.networks),
+  generation::GenerationOptions options = arguments.options;
+  options.networks = features::open_networks(arguments.networks),
   options.threads = arguments.threads;
   const train::PackageFile population =
       train::open_package(arguments.population, PackageKind::kPopulation);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
-  const nlohmann::json networks = evaluate::describe_networks(options.networks, population.package);
-  std::optional<evaluate::CapturedPeople> people;
+  const nlohmann::json networks = features::describe_networks(options.networks, population.package);
+  std::optional<generation::CapturedPeople> people;
   if (!arguments.recipe.empty())
     people.emplace(arguments.recipe, arguments.makehuman, population.package.population());
   Samplers samplers(arguments, population.package);
-  const evaluate::MemberSet set(population.package, body.package,
-                                {.threads = arguments.threads, .quiet = arguments.quiet});
+  const members::MemberSet set(population.package, body.package,
+                               {.threads = arguments.threads, .quiet = arguments.quiet});
   if (people) options.captures = people->draw(set, set.held_out);
   samplers.draw(set);
-  std::vector<evaluate::Generated>& generated = samplers.generated;
+  std::vector<generation::Generated>& generated = samplers.generated;
   double noised_db = NAN;
   if (arguments.baselines) {
-    noised_db = generated.empty() ? 20 : evaluate::nearest_member_db(set, generated.front());
-    for (evaluate::Generated& baseline :
-         evaluate::make_baselines(set, arguments.rank, noised_db, arguments.options.seed)) {
+    noised_db = generated.empty() ? 20 : generation::nearest_member_db(set, generated.front());
+    for (generation::Generated& baseline :
+         generation::make_baselines(set, arguments.rank, noised_db, arguments.options.seed)) {
       generated.push_back(std::move(baseline));
     }
   }
@@ -294,7 +294,7 @@ void run_generation(const GenerationArguments& arguments) {
   if (arguments.baselines) report["noised_members_db"] = noised_db;
   report["runs"] = samplers.about;
   report["networks"] = networks;
-  report.update(evaluate::evaluate_generation(set, generated, options));
+  report.update(generation::evaluate_generation(set, generated, options));
   if (!arguments.quiet) {
     print_rows(report.at("rows"));
     if (people) print_rows_against_captures(report);
@@ -302,12 +302,12 @@ void run_generation(const GenerationArguments& arguments) {
       print_rows_through(name, report.at("rows"));
   }
   if (!arguments.sheet.empty()) {
-    std::vector<evaluate::RowMatrix> sets;
-    for (const evaluate::Generated& one : generated) sets.push_back(one.z);
+    std::vector<measure::RowMatrix> sets;
+    for (const generation::Generated& one : generated) sets.push_back(one.z);
     const ports::ImageU8 sheet =
-        evaluate::draw_people(set, sets, std::min(kSheetPeople, set.training.size()));
+        members::draw_people(set, sets, std::min(kSheetPeople, set.training.size()));
     throw_if_error(
-        ports::write_file_atomically(arguments.sheet, evaluate::encode_sheet(sheet, kSheetBytes)),
+        ports::write_file_atomically(arguments.sheet, members::encode_sheet(sheet, kSheetBytes)),
         "cannot save");
   }
   if (!arguments.output.empty()) train::write_json(arguments.output, report);

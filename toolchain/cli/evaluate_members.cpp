@@ -12,8 +12,8 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/member_sheets.h"
-#include "toolchain/evaluate/members.h"
+#include "toolchain/members/member_sheets.h"
+#include "toolchain/members/members.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"
@@ -27,7 +27,7 @@ constexpr size_t kMaxSheetBytes = 1'500'000;
 struct MembersArguments {
   std::string population, body, motion, output, wall, interpolation, worst_sheet;
   size_t worst = 10;
-  evaluate::MembersOptions options;
+  members::MembersOptions options;
   uint32_t threads = 1;
   bool quiet = false;
 };
@@ -39,7 +39,7 @@ void check_name(const char* option, const std::string& path) {
 }
 
 void save_sheet(const std::string& path, const ports::ImageU8& sheet) {
-  throw_if_error(ports::write_file_atomically(path, evaluate::encode_sheet(sheet, kMaxSheetBytes)),
+  throw_if_error(ports::write_file_atomically(path, members::encode_sheet(sheet, kMaxSheetBytes)),
                  "cannot save");
 }
 
@@ -125,30 +125,30 @@ void run_members(const MembersArguments& arguments) {
     throw_if_error(check_motion_fits_body(motion->package.motion(), body.package.body()),
                    arguments.motion);
   }
-  const evaluate::MemberSet set(population.package, body.package,
-                                {.motion = motion ? &motion->package.motion() : nullptr,
-                                 .threads = arguments.threads,
-                                 .quiet = arguments.quiet});
-  const evaluate::MemberDistances distances(set);
-  const std::vector<evaluate::MixedPair> pairs = evaluate::choose_pairs(distances);
+  const members::MemberSet set(population.package, body.package,
+                               {.motion = motion ? &motion->package.motion() : nullptr,
+                                .threads = arguments.threads,
+                                .quiet = arguments.quiet});
+  const members::MemberDistances distances(set);
+  const std::vector<members::MixedPair> pairs = members::choose_pairs(distances);
   nlohmann::json report{{"command", train::current_command()},
                         {"commit", train::current_commit()},
                         {"machine", train::describe_machine()},
                         {"date", train::utc_now()},
                         {"package", arguments.population},
                         {"package_hash", format_hash(population.package.content_hash())}};
-  report.update(evaluate::evaluate_members(set, distances, pairs, arguments.options));
+  report.update(members::evaluate_members(set, distances, pairs, arguments.options));
   // Pictures are drawn before anything is written: what is interrupted leaves nothing.
   std::optional<ports::ImageU8> wall, strip, worst;
   const std::vector<size_t> worst_members =
-      evaluate::worst_members(population.package.population(), arguments.worst);
-  if (!arguments.wall.empty()) wall = evaluate::draw_wall(set);
-  if (!arguments.interpolation.empty()) strip = evaluate::draw_mixtures(set, pairs);
+      members::worst_members(population.package.population(), arguments.worst);
+  if (!arguments.wall.empty()) wall = members::draw_wall(set);
+  if (!arguments.interpolation.empty()) strip = members::draw_mixtures(set, pairs);
   if (!arguments.worst_sheet.empty()) {
     if (worst_members.empty())
       throw InputError(arguments.population +
                        ": --worst-sheet: no member has the quality psnr_pose_db");
-    worst = evaluate::draw_close(set, worst_members);
+    worst = members::draw_close(set, worst_members);
   }
   if (wall) save_sheet(arguments.wall, *wall);
   if (strip) save_sheet(arguments.interpolation, *strip);

@@ -8,7 +8,7 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/feature_trainer.h"
+#include "toolchain/features/feature_trainer.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"
 
@@ -16,12 +16,12 @@ namespace figurine::cli {
 
 namespace {
 
-void run(evaluate::FeatureRequest request) {
+void run(features::FeatureRequest request) {
   if (std::filesystem::path(request.output).extension() != ".safetensors") {
     throw InputError("--output: '" + request.output + "' must end in .safetensors");
   }
   request.command = train::current_command();
-  const evaluate::FeatureResult result = evaluate::train_features(request);
+  const features::FeatureResult result = features::train_features(request);
   if (request.quiet) return;
   std::printf(
       "%s: %s%llu iterations in %.0f s, loss %.3f, %.1f %% of training pictures told right\n",
@@ -33,8 +33,8 @@ void run(evaluate::FeatureRequest request) {
 }  // namespace
 
 void add_features_command(CLI::App& app) {
-  auto request = std::make_shared<evaluate::FeatureRequest>();
-  evaluate::FeatureSettings& settings = request->settings;
+  auto request = std::make_shared<features::FeatureRequest>();
+  features::FeatureSettings& settings = request->settings;
   request->threads = train::default_threads();
   CLI::App* command = app.add_subcommand(
       "features", "Train figurine-features, through which pictures of avatars are compared");

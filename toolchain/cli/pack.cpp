@@ -17,6 +17,7 @@
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/pack_population.h"
 #include "toolchain/train/threads.h"
+#include "toolchain/verify/golden_seeds.h"
 #include "toolchain/verify/parity.h"
 
 namespace figurine::cli {
@@ -125,6 +126,7 @@ void run_sampler(const PackArguments& arguments) {
   options.body = arguments.open.body;
   options.name = arguments.pack.name;
   options.threads = arguments.open.threads;
+  options.sample_on_device = verify::sample_golden_seeds;
   if (arguments.solver == "ddim") options.method = SolverMethod::kDdim;
   const std::vector<std::byte> bytes = generate::pack_sampler(options);
   throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");

@@ -2,9 +2,9 @@
 
 #include "figurine/pose.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/member_pictures.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/tensor_operations.h"
+#include "toolchain/train/opened_member.h"
 #include "toolchain/train/progress.h"
 
 namespace figurine::generate {
@@ -38,7 +38,7 @@ ActivationRanges observe_training_members(const Population& population, const Pa
   // The network sees the mean template in every pose: its input is the same for all members.
   model::PoseUNet unet(population.network, {.precision = model::Precision::kFloat32});
   std::vector<torch::Tensor> inputs;
-  for (const train::OwnedPose& pose : evaluate::fixed_poses(population, nullptr, poses)) {
+  for (const train::OwnedPose& pose : train::fixed_poses(population, nullptr, poses)) {
     inputs.push_back(network_input(population, body.body(), pose.view()));
   }
 
@@ -51,7 +51,7 @@ ActivationRanges observe_training_members(const Population& population, const Pa
     if (population.members[m].split != Split::kTrain) continue;
     progress.show(static_cast<double>(m) / static_cast<double>(population.size()),
                   "member " + population.members[m].name);
-    const evaluate::OpenedMember member(population, m);
+    const train::OpenedMember member(population, m);
     unet.import_network(member.avatar.network);
     for (const torch::Tensor& input : inputs) {
       quantize::count_values(population.network, unet.evaluate_values(input), statistics);

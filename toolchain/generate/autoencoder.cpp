@@ -10,7 +10,7 @@
 
 namespace figurine::generate {
 
-using evaluate::RowMatrix;
+using measure::RowMatrix;
 
 namespace {
 

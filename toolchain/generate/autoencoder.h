@@ -26,7 +26,7 @@
 #include "toolchain/generate/flat_trainer.h"
 #include "toolchain/generate/model_space.h"
 #include "toolchain/generate/sampler_settings.h"
-#include "toolchain/train/random.h"
+#include "toolchain/random/shuffled_order.h"
 
 namespace figurine::generate {
 
@@ -42,8 +42,8 @@ class Autoencoder : public WeightCodec {
   Posterior posterior(const torch::Tensor& z) const;          // [B,W], differentiable
   torch::Tensor reconstruct(const torch::Tensor& map) const;  // [B,C,S,S] to [B,W], differentiable
 
-  evaluate::RowMatrix encode(const evaluate::RowMatrix& z) const override;  // means
-  evaluate::RowMatrix decode(const evaluate::RowMatrix& latents) const override;
+  measure::RowMatrix encode(const measure::RowMatrix& z) const override;  // means
+  measure::RowMatrix decode(const measure::RowMatrix& latents) const override;
   const std::vector<size_t>& token_sizes() const override {
     return token_sizes_;
   }  // S rows of the map
@@ -63,7 +63,7 @@ class Autoencoder : public WeightCodec {
 class Autoencoding : public FlatModel {
  public:
   Autoencoding(std::shared_ptr<Autoencoder> autoencoder, const SamplerSettings& settings,
-               const evaluate::RowMatrix& training, const evaluate::RowMatrix& validation);
+               const measure::RowMatrix& training, const measure::RowMatrix& validation);
 
   torch::Tensor& weights() override { return autoencoder_->parameters().weights(); }
   torch::Tensor& gradients() override { return autoencoder_->parameters().gradients(); }
@@ -74,7 +74,7 @@ class Autoencoding : public FlatModel {
   std::shared_ptr<Autoencoder> autoencoder_;
   SamplerSettings settings_;
   torch::Tensor training_, validation_;
-  train::ShuffledOrder order_;
+  random::ShuffledOrder order_;
 };
 
 }  // namespace figurine::generate

@@ -9,9 +9,9 @@
 
 namespace figurine::generate {
 
-using evaluate::RowMatrix;
-using evaluate::RowVector;
-using evaluate::Token;
+using measure::RowMatrix;
+using measure::RowVector;
+using measure::Token;
 
 namespace {
 
@@ -59,7 +59,7 @@ ModelSpace::ModelSpace(const RowMatrix& training, const std::vector<Token>& toke
   } else {
     const RowMatrix z = standardisation_.standardise(training);
     for (const Token& token : tokens) {
-      const evaluate::PrincipalBasis basis(z, token.begin, token.size);
+      const measure::PrincipalBasis basis(z, token.begin, token.size);
       // A token that nothing varies in (rank 0) still needs a place: one direction of zeros.
       const size_t rank = std::min(options_.rank, basis.rank());
       directions_.push_back(rank > 0 ? basis.directions(rank)

@@ -26,7 +26,7 @@
 #include <string>
 #include <vector>
 
-#include "toolchain/evaluate/weight_space.h"
+#include "toolchain/measure/weight_space.h"
 
 namespace figurine::generate {
 
@@ -44,20 +44,19 @@ struct ModelSpaceOptions {
 class WeightCodec {
  public:
   virtual ~WeightCodec() = default;
-  virtual evaluate::RowMatrix encode(const evaluate::RowMatrix& z) const = 0;  // [M,W] to [M,D]
-  virtual evaluate::RowMatrix decode(
-      const evaluate::RowMatrix& latents) const = 0;           // [M,D] to [M,W]
-  virtual const std::vector<size_t>& token_sizes() const = 0;  // [L]
+  virtual measure::RowMatrix encode(const measure::RowMatrix& z) const = 0;        // [M,W] to [M,D]
+  virtual measure::RowMatrix decode(const measure::RowMatrix& latents) const = 0;  // [M,D] to [M,W]
+  virtual const std::vector<size_t>& token_sizes() const = 0;                      // [L]
 };
 
 class ModelSpace {
  public:
   // training: [N,W] as read_weights gives them, N >= 2. codec: of `latent`, and of it alone.
-  ModelSpace(const evaluate::RowMatrix& training, const std::vector<evaluate::Token>& tokens,
+  ModelSpace(const measure::RowMatrix& training, const std::vector<measure::Token>& tokens,
              const ModelSpaceOptions& options, std::shared_ptr<const WeightCodec> codec = nullptr);
 
   const ModelSpaceOptions& options() const { return options_; }
-  const evaluate::Standardisation& standardisation() const { return standardisation_; }
+  const measure::Standardisation& standardisation() const { return standardisation_; }
   const std::vector<size_t>& token_sizes() const { return token_sizes_; }  // [L]; their sum is D
   size_t size() const { return size_; }                                    // D
   // Values that vary, the dimension that noise levels are placed by: the rest (dead channels,
@@ -66,25 +65,25 @@ class ModelSpace {
 
   // weights: [M,W]; model vectors [M,D], of mean square 1 over the training members and the varying
   // values.
-  evaluate::RowMatrix encode(const evaluate::RowMatrix& weights) const;
+  measure::RowMatrix encode(const measure::RowMatrix& weights) const;
   // The weights [W] of a model vector [D]. encode(decode(x)) == x but for rounding, except where x
   // leaves its space (padding, dead values) and in `latent`, whose autoencoder only comes near.
-  evaluate::RowVector decode(const evaluate::RowVector& values) const;
+  measure::RowVector decode(const measure::RowVector& values) const;
 
   // Of `basis`: directions of a token as orthonormal rows [K,size], and the factor between a model
   // value and a coordinate.
-  const evaluate::RowMatrix& directions(size_t token) const { return directions_[token]; }
+  const measure::RowMatrix& directions(size_t token) const { return directions_[token]; }
   double coordinate_scale(size_t token) const { return coordinate_scale_[token]; }
 
  private:
   ModelSpaceOptions options_;
-  evaluate::Standardisation standardisation_;
+  measure::Standardisation standardisation_;
   std::vector<size_t> token_sizes_;
   size_t size_ = 0, dimension_ = 0;
-  std::vector<evaluate::RowMatrix> directions_;
+  std::vector<measure::RowMatrix> directions_;
   std::vector<double> coordinate_scale_;
   std::shared_ptr<const WeightCodec> codec_;
-  evaluate::RowVector latent_mean_;  // [D]
+  measure::RowVector latent_mean_;  // [D]
   double latent_scale_ = 1;
 };
 

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "figurine/check.h"
 #include "formats/writer/package_writer.h"
 #include "formats/writer/sampler_writer.h"
 #include "toolchain/error.h"
@@ -9,7 +10,6 @@
 #include "toolchain/generate/quantised_sampler.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"
-#include "toolchain/verify/golden_seeds.h"
 
 namespace figurine::generate {
 
@@ -79,9 +79,12 @@ std::vector<std::byte> pack_sampler(const PackSamplerOptions& options) {
 
   // Written twice: the first copy is sampled from, as a device would, and says what its golden
   // seeds are.
-  const AlignedBytes draft(value_or_throw(write_sampler(package), options.run));
-  const Package opened = value_or_throw(Package::open(draft.bytes(), options.run), options.run);
-  sampler.golden_seeds = verify::sample_golden_seeds(opened.sampler(), options.golden_seeds);
+  if (options.golden_seeds > 0) {
+    FIG_CHECK(options.sample_on_device != nullptr, "golden seeds need a device to sample them");
+    const AlignedBytes draft(value_or_throw(write_sampler(package), options.run));
+    const Package opened = value_or_throw(Package::open(draft.bytes(), options.run), options.run);
+    sampler.golden_seeds = options.sample_on_device(opened.sampler(), options.golden_seeds);
+  }
   return value_or_throw(write_sampler(package), options.run);
 }
 

@@ -1,9 +1,10 @@
-// A trained sampler to its package: int8, the population's activation ranges, golden seeds made by
-// the device's own sampler.
+// A trained sampler to its package: int8, the population's activation ranges, golden seeds that the
+// caller samples on the device's own code.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ struct PackSamplerOptions {
   SolverMethod method = SolverMethod::kDpmSolverPlusPlus2M;
   uint32_t golden_seeds = 2;  // seeds 0, 1, ... whose weights every device must arrive at; emulated
                               // CPUs take seconds for one
+  // How the device's own code samples them (verify::sample_golden_seeds): nothing of this folder
+  // runs the device. Needed where golden_seeds is above 0 (FIG_CHECK).
+  std::function<std::vector<GoldenSeed>(const Sampler& sampler, uint32_t count)> sample_on_device;
   uint32_t calibration_poses = 8;  // of every training member, for the ranges
   quantize::CalibrationOptions calibration;
   uint32_t threads = 1;

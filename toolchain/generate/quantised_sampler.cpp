@@ -106,11 +106,11 @@ void QuantisedSampler::take_what_members_share(const Population& population) {
 
 void QuantisedSampler::quantise_space(const TrainedSampler& trained) {
   const ModelSpace& space = *trained.space;
-  const evaluate::Standardisation& standardisation = space.standardisation();
+  const measure::Standardisation& standardisation = space.standardisation();
   for (Eigen::Index j = 0; j < standardisation.mean().size(); ++j)
     mean_.push_back(static_cast<float>(standardisation.mean()[j]));
   for (size_t l = 0; l < space.token_sizes().size(); ++l) {
-    const evaluate::RowMatrix& directions = space.directions(l);
+    const measure::RowMatrix& directions = space.directions(l);
     sampler_.ranks.push_back(static_cast<uint32_t>(directions.rows()));
     // A direction's entry of a value that does not vary is zero: the value stays at its mean, as
     // restore() has it.

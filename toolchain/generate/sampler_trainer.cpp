@@ -15,14 +15,15 @@
 #include "toolchain/generate/autoencoder.h"
 #include "toolchain/generate/flat_trainer.h"
 #include "toolchain/generate/tensors.h"
+#include "toolchain/random/counter.h"
+#include "toolchain/random/shuffled_order.h"
 #include "toolchain/tensor_operations.h"
-#include "toolchain/train/random.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/threads.h"
 
 namespace figurine::generate {
 
-using evaluate::RowMatrix;
+using measure::RowMatrix;
 
 namespace {
 
@@ -72,8 +73,8 @@ class Denoising : public FlatModel {
       const int64_t place = share.first + row;
       const uint64_t counter =
           iteration * static_cast<uint64_t>(batch) + static_cast<uint64_t>(place);
-      const double u = (static_cast<double>(place) +
-                        static_cast<double>(train::random_unit(settings_.seed, kLevels, counter))) /
+      const double u = (static_cast<double>(place) + static_cast<double>(random::random_unit(
+                                                         settings_.seed, kLevels, counter))) /
                        static_cast<double>(batch);
       const auto member = static_cast<int64_t>(order_.item(counter));
       add_noisy(noisy, row, training_[member], draw_noise(settings_.seed, kNoise, counter, size),
@@ -116,7 +117,7 @@ class Denoising : public FlatModel {
   NoiseSchedule noise_;
   torch::Tensor training_;  // [N,D]
   NoisyBatch validation_;
-  train::ShuffledOrder order_;
+  random::ShuffledOrder order_;
   Transformer transformer_;
 };
 
@@ -148,7 +149,7 @@ struct Members {
 
 Members members_of(const Population& population, const SamplerSettings& settings,
                    const std::string& path) {
-  const RowMatrix weights = evaluate::read_weights(population);
+  const RowMatrix weights = measure::read_weights(population);
   Members members{rows_of(population, weights, Split::kTrain, settings.members),
                   rows_of(population, weights, Split::kValidation)};
   if (members.training.rows() < 2) throw InputError(path + ": has fewer than two training members");
@@ -159,8 +160,8 @@ Members members_of(const Population& population, const SamplerSettings& settings
   return members;
 }
 
-std::vector<evaluate::Token> tokens_of(const Population& population) {
-  return evaluate::weight_tokens(population.network, population.shape.size() / population.size());
+std::vector<measure::Token> tokens_of(const Population& population) {
+  return measure::weight_tokens(population.network, population.shape.size() / population.size());
 }
 
 nlohmann::json read_run(const train::RunDirectory& run) {
@@ -352,10 +353,10 @@ FlatTraining training_of(const SamplerRequest& request, const SamplerSettings& s
 // description: the run's, on rank 0.
 void train_autoencoder(const std::shared_ptr<Autoencoder>& autoencoder,
                        const SamplerRequest& request, const SamplerSettings& settings,
-                       const Members& members, const std::vector<evaluate::Token>& tokens,
+                       const Members& members, const std::vector<measure::Token>& tokens,
                        ProcessGroup& group, nlohmann::json& description) {
   const train::RunDirectory run{request.run};
-  const evaluate::Standardisation standardisation(members.training, tokens);
+  const measure::Standardisation standardisation(members.training, tokens);
   Autoencoding autoencoding(autoencoder, settings, standardisation.standardise(members.training),
                             standardisation.standardise(members.validation));
   FlatTraining training = training_of(request, settings);
@@ -378,7 +379,7 @@ void train_autoencoder(const std::shared_ptr<Autoencoder>& autoencoder,
   autoencoding.weights().copy_(trainer.average());
 }
 
-ModelSpace make_space(const Members& members, const std::vector<evaluate::Token>& tokens,
+ModelSpace make_space(const Members& members, const std::vector<measure::Token>& tokens,
                       const SamplerSettings& settings, std::shared_ptr<const WeightCodec> codec) {
   return {members.training, tokens, settings.space, std::move(codec)};
 }
@@ -401,7 +402,7 @@ SamplerResult train_sampler(const SamplerRequest& request) {
     return group.leads() ? result_of(plan.description) : SamplerResult{.was_finished = true};
   SamplerSettings& settings = plan.settings;
   const Members members = members_of(population.package.population(), settings, request.population);
-  const std::vector<evaluate::Token> tokens = tokens_of(population.package.population());
+  const std::vector<measure::Token> tokens = tokens_of(population.package.population());
   train::use_threads(settings.threads);
 
   // What can be wrong is found before anything is written: the tokens of `latent` are known before

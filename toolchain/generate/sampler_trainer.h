@@ -66,8 +66,8 @@ SamplerResult train_sampler(const SamplerRequest& request);
 
 // The rows of a population's weights that belong to one part, in its order: [M,W]. At most `most`
 // of them, 0: all.
-evaluate::RowMatrix rows_of(const Population& population, const evaluate::RowMatrix& weights,
-                            Split split, uint32_t most = 0);
+measure::RowMatrix rows_of(const Population& population, const measure::RowMatrix& weights,
+                           Split split, uint32_t most = 0);
 
 // Whether a folder holds a run of a sampler, rather than of an avatar or nothing.
 bool is_sampler_run(const std::string& path);
@@ -77,7 +77,7 @@ struct TrainedSampler {
   std::unique_ptr<train::PackageFile> population;
   SamplerSettings settings;
   std::unique_ptr<ModelSpace> space;
-  evaluate::RowMatrix training;  // [N,D] model vectors
+  measure::RowMatrix training;  // [N,D] model vectors
   std::unique_ptr<Transformer> transformer;
 
   // population: where it is now; empty: where the run found it.

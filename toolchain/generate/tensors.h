@@ -4,13 +4,13 @@
 
 #include <cstdint>
 
-#include "toolchain/evaluate/weight_space.h"
+#include "toolchain/measure/weight_space.h"
 #include "toolchain/tensor.h"
 
 namespace figurine::generate {
 
-torch::Tensor to_tensor(const evaluate::RowMatrix& rows);  // [M,D], rounded to float
-evaluate::RowMatrix to_rows(const torch::Tensor& values);  // [M,D] float
+torch::Tensor to_tensor(const measure::RowMatrix& rows);  // [M,D], rounded to float
+measure::RowMatrix to_rows(const torch::Tensor& values);  // [M,D] float
 // [size] standard normal values of one draw; streams are told apart by their number.
 torch::Tensor draw_noise(uint64_t seed, uint64_t stream, uint64_t counter, int64_t size);
 

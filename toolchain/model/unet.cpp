@@ -6,6 +6,7 @@
 #include "toolchain/error.h"
 #include "toolchain/model/fake_quantisation.h"
 #include "toolchain/model/unet_plan.h"
+#include "toolchain/random/split_mix.h"
 #include "toolchain/tensor_operations.h"
 
 namespace figurine::model {
@@ -13,25 +14,6 @@ namespace figurine::model {
 namespace {
 
 constexpr at::MemoryFormat kChannelsLast = at::MemoryFormat::ChannelsLast;
-
-// SplitMix64 (Steele et al., Fast Splittable Pseudorandom Number Generators, 2014): integers only,
-// so the same everywhere.
-class Random {
- public:
-  explicit Random(uint64_t seed) : state_(seed) {}
-  // Uniform in [-1, 1), a multiple of 2^-23: exact in float.
-  float uniform() {
-    state_ += 0x9e3779b97f4a7c15ull;
-    uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    z ^= z >> 31;
-    return static_cast<float>(static_cast<int64_t>(z >> 40) - (int64_t(1) << 23)) * 0x1p-23f;
-  }
-
- private:
-  uint64_t state_;
-};
 
 }  // namespace
 
@@ -211,13 +193,13 @@ PoseUNet::PoseUNet(const Network& network, const PoseUNetOptions& options)
   // variance: no libm but sqrt, which is exact everywhere.
   impl_->weights = torch::zeros({plan.parameters});
   float* const flat = impl_->weights.mutable_data_ptr<float>();
-  Random random(options.seed);
+  random::SplitMix random(options.seed);
   for (size_t i = 0; i < network.layers.size(); ++i) {
     if (network.layers[i].op != LayerOp::kConv2d) continue;
     const ConvolutionSlot& slot = plan.slots[i];
     float bound = std::sqrt(6.0f / static_cast<float>(slot.kernel * slot.kernel * slot.in));
     if (plan.is_head(i)) bound *= options.head_weight_factor;
-    for (int64_t k = slot.weights; k < slot.bias; ++k) flat[k] = bound * random.uniform();
+    for (int64_t k = slot.weights; k < slot.bias; ++k) flat[k] = bound * random.signed_unit();
     if (plan.is_head(i) && slot.out >= 14) {
       for (int64_t channel = 11; channel < 14; ++channel)
         flat[slot.bias + channel] = options.rgb_bias;

@@ -12,10 +12,10 @@
 #include "toolchain/capture/capture.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/contact_sheet.h"
-#include "toolchain/evaluate/reconstruction.h"
-#include "toolchain/evaluate/requantization.h"
 #include "toolchain/model/unet.h"
+#include "toolchain/pictures/contact_sheet.h"
+#include "toolchain/reconstruction/reconstruction.h"
+#include "toolchain/reconstruction/requantization.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/pack_avatar.h"
@@ -81,7 +81,7 @@ nlohmann::json rounding_loss(const Workshop& workshop, train::TrainedAvatar& ava
   const Package opened = value_or_throw(Package::open(rounded.bytes(), "member"), "member");
   std::vector<float> weights(member_floats(opened.population()));
   const Avatar member = open_member(opened.population(), 0, weights);
-  return evaluate::evaluate_requantization(
+  return reconstruction::evaluate_requantization(
       avatar, member, {.view_frame_step = workshop.recipe.view_frame_step, .quiet = true});
 }
 
@@ -146,9 +146,9 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
   train::TrainedAvatar avatar = train(workshop, data, run, Variant::kMember);
   const double train_cpu =
       cpu_s() - train_start;  // of this attempt: less than all of it after an interruption
-  const evaluate::ReconstructionOptions looking{.quiet = true,
-                                                .view_frame_step = workshop.recipe.view_frame_step};
-  const nlohmann::json quality = evaluate::evaluate_reconstruction(avatar, looking);
+  const reconstruction::ReconstructionOptions looking{
+      .quiet = true, .view_frame_step = workshop.recipe.view_frame_step};
+  const nlohmann::json quality = reconstruction::evaluate_reconstruction(avatar, looking);
   train::write_json(train::RunDirectory{run}.evaluation(), quality);
   const std::vector<std::byte> package = train::pack_avatar(avatar, {run}, {.golden = false});
   const nlohmann::json description = train::read_json(train::RunDirectory{run}.run_json());
@@ -166,16 +166,16 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
   if (contains(workshop.recipe.frozen, identity.number)) {
     train::TrainedAvatar frozen =
         train(workshop, data, state.frozen_run(name), Variant::kFrozenPose);
-    row["frozen_pose"] = evaluate::evaluate_reconstruction(frozen, looking);
+    row["frozen_pose"] = reconstruction::evaluate_reconstruction(frozen, looking);
   }
   if (contains(workshop.recipe.scratch, identity.number)) {
     train::TrainedAvatar scratch =
         train(workshop, data, state.scratch_run(name), Variant::kFromScratch);
-    row["from_scratch"] = {{"quality", evaluate::evaluate_reconstruction(scratch, looking)},
+    row["from_scratch"] = {{"quality", reconstruction::evaluate_reconstruction(scratch, looking)},
                            {"log", training_log(state.scratch_run(name))}};
     row["log"] = training_log(run);
   }
-  save(state.sheet(name), dataset::encode_jpeg(evaluate::make_contact_sheet(
+  save(state.sheet(name), dataset::encode_jpeg(pictures::make_contact_sheet(
                                                    avatar, {.pairs = 3, .person_height_px = 320}),
                                                kSheetQuality));
   save(state.member(name), package);

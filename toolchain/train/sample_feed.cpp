@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "toolchain/error.h"
+#include "toolchain/random/counter.h"
 #include "toolchain/tensor_operations.h"
 
 namespace figurine::train {
@@ -187,7 +188,8 @@ Sample SampleFeed::prepare(uint64_t number) {
       break;
     case TrainingBackground::kRandom:
       for (uint64_t c = 0; c < 3; ++c)
-        sample.background[c] = random_unit(settings.seed, kBackgroundStream, 3 * number + c);
+        sample.background[c] =
+            random::random_unit(settings.seed, kBackgroundStream, 3 * number + c);
       break;
   }
   return sample;

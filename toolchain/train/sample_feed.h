@@ -18,8 +18,8 @@
 
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/model/render.h"
+#include "toolchain/random/shuffled_order.h"
 #include "toolchain/train/avatar_model.h"
-#include "toolchain/train/random.h"
 
 namespace figurine::train {
 
@@ -75,7 +75,7 @@ class SampleFeed {
   const AvatarModel& model_;
   std::vector<std::pair<size_t, size_t>>
       pairs_;  // (frame, camera) of all training images, by frame
-  ShuffledOrder order_;
+  random::ShuffledOrder order_;
   std::unordered_map<size_t, std::shared_ptr<const CroppedImage>> images_;
   size_t image_bytes_ = 0;
 

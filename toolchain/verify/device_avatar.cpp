@@ -21,7 +21,7 @@ void DeviceAvatar::pose(const PoseView& pose) {
   sh_.assign(view.sh.begin(), view.sh.end());
 }
 
-evaluate::Picture DeviceAvatar::draw(const Camera& camera, const std::array<float, 3>& offset_m) {
+measure::Picture DeviceAvatar::draw(const Camera& camera, const std::array<float, 3>& offset_m) {
   Camera moved = camera;  // the other way round: R (x + o) + t = R x + (R o + t)
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k)
@@ -43,7 +43,7 @@ evaluate::Picture DeviceAvatar::draw(const Camera& camera, const std::array<floa
   for (size_t at = 0; at < rgba.size(); at += 4) {
     for (int c = 0; c < 3; ++c) rgba[at + c] *= rgba[at + 3];
   }
-  return evaluate::quantise_picture(camera.width_px, camera.height_px, rgba);
+  return measure::quantise_picture(camera.width_px, camera.height_px, rgba);
 }
 
 }  // namespace figurine::verify

@@ -13,7 +13,7 @@
 #include "figurine/gaussian.h"
 #include "figurine/package.h"
 #include "figurine/pose.h"
-#include "toolchain/evaluate/metrics.h"
+#include "toolchain/measure/metrics.h"
 
 namespace figurine {
 class Renderer;
@@ -37,7 +37,7 @@ class DeviceAvatar {
   // World centres of the posed Gaussians, [n,3]; valid until the next pose.
   std::span<const float> centres_m() const { return position_m_; }
   // The posed avatar, moved by `offset_m`.
-  evaluate::Picture draw(const Camera& camera, const std::array<float, 3>& offset_m = {0, 0, 0});
+  measure::Picture draw(const Camera& camera, const std::array<float, 3>& offset_m = {0, 0, 0});
 
  private:
   std::unique_ptr<Renderer> renderer_;

@@ -10,11 +10,11 @@
 
 namespace figurine::verify {
 
-evaluate::RowMatrix sample_weights(const Sampler& sampler, const DeviceSamplesOptions& options) {
+measure::RowMatrix sample_weights(const Sampler& sampler, const DeviceSamplesOptions& options) {
   const std::unique_ptr<AvatarSampler> device =
       value_or_throw(AvatarSampler::create(sampler), sampler.name);
-  evaluate::RowMatrix weights(static_cast<Eigen::Index>(options.count),
-                              static_cast<Eigen::Index>(sampler.mean.size()));
+  measure::RowMatrix weights(static_cast<Eigen::Index>(options.count),
+                             static_cast<Eigen::Index>(sampler.mean.size()));
   train::Progress progress("sampling " + sampler.name, options.quiet);
   const train::InterruptGuard interrupt;
   SampledAvatar person;
@@ -25,7 +25,7 @@ evaluate::RowMatrix sample_weights(const Sampler& sampler, const DeviceSamplesOp
     throw_if_error(device->sample({.seed = seed, .steps = options.steps}, person),
                    sampler.name + ": seed " + std::to_string(seed));
     auto row = weights.row(static_cast<Eigen::Index>(i));
-    evaluate::read_weights(person.avatar(), {row.data(), static_cast<size_t>(row.size())});
+    measure::read_weights(person.avatar(), {row.data(), static_cast<size_t>(row.size())});
     progress.show(static_cast<double>(i + 1) / static_cast<double>(options.count),
                   "seed " + std::to_string(seed));
   }

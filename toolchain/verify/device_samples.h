@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "figurine/sampler.h"
-#include "toolchain/evaluate/weight_space.h"
+#include "toolchain/measure/weight_space.h"
 
 namespace figurine::verify {
 
@@ -19,6 +19,6 @@ struct DeviceSamplesOptions {
 // Seeds first_seed, first_seed + 1, ...: [S,W] weights before they are rounded to an avatar's int8,
 // in the order of a population's members. sampler: of an opened package. Throws InputError if one
 // cannot be sampled, or train::Interrupted.
-evaluate::RowMatrix sample_weights(const Sampler& sampler, const DeviceSamplesOptions& options);
+measure::RowMatrix sample_weights(const Sampler& sampler, const DeviceSamplesOptions& options);
 
 }  // namespace figurine::verify

@@ -9,7 +9,7 @@
 #include "figurine/avatar_sampler.h"
 #include "runtime/src/sample/device_transformer.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/member_pictures.h"
+#include "toolchain/measure/union_error.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/verify/device_avatar.h"
@@ -57,11 +57,11 @@ struct Case {
   RowMatrix exact;
 };
 
-std::vector<evaluate::Picture> portraits(const Sampler& sampler, const Package& body,
-                                         const SampleRequest& base, size_t seeds) {
+std::vector<measure::Picture> portraits(const Sampler& sampler, const Package& body,
+                                        const SampleRequest& base, size_t seeds) {
   const std::unique_ptr<AvatarSampler> device =
       value_or_throw(AvatarSampler::create(sampler), sampler.name);
-  std::vector<evaluate::Picture> pictures;
+  std::vector<measure::Picture> pictures;
   SampledAvatar person;
   for (uint64_t seed = 0; seed < seeds; ++seed) {
     SampleRequest request = base;
@@ -109,7 +109,7 @@ nlohmann::json measure_sampling_error(const generate::TrainedSampler& trained,
   for (Case& one : cases)
     one.exact =
         draw(*one.denoiser, options.reference_evaluations, SolverMethod::kDpmSolverPlusPlus2M);
-  const std::vector<evaluate::Picture> exact_pictures = portraits(
+  const std::vector<measure::Picture> exact_pictures = portraits(
       sampler, body,
       {.steps = options.reference_evaluations, .method = SolverMethod::kDpmSolverPlusPlus2M},
       options.seeds);
@@ -130,9 +130,9 @@ nlohmann::json measure_sampling_error(const generate::TrainedSampler& trained,
                            {"seconds", seconds / static_cast<double>(options.seeds)}};
         if (is_device) {
           row["float_rms_error"] = rms(drawn, cases[1].exact);
-          const std::vector<evaluate::Picture> pictures =
+          const std::vector<measure::Picture> pictures =
               portraits(sampler, body, {.steps = evaluations, .method = method}, options.seeds);
-          const double psnr_db = evaluate::union_error(pictures, exact_pictures).psnr_db();
+          const double psnr_db = measure::union_error(pictures, exact_pictures).psnr_db();
           row["picture_db"] = std::isfinite(psnr_db)
                                   ? nlohmann::json(psnr_db)
                                   : nlohmann::json();  // null: the same to the bit

@@ -6,7 +6,7 @@
 
 #include "gtest/gtest.h"
 #include "samples/program.h"
-#include "toolchain/evaluate/people.h"
+#include "toolchain/features/people.h"
 #include "toolchain/population/small_recipe.h"
 
 namespace figurine::cli {
@@ -37,7 +37,7 @@ const nlohmann::json& row_of(const nlohmann::json& report, const std::string& na
 TEST(EvaluateGeneration, HoldsRowsAgainstBothPartsThroughANetworkToo) {
   const TestFolder folder;
   tests::write_test_packages(folder);
-  evaluate::test::write_people(folder.path("people.fgn"),
+  features::test::write_people(folder.path("people.fgn"),
                                {.training = 4, .validation = 1, .test = 1});
   const ProgramRun trained =
       tests::run_shell(FIGURINE_TRAIN
@@ -101,7 +101,7 @@ TEST(EvaluateGeneration, HoldsRowsAgainstBothPartsThroughANetworkToo) {
 TEST(EvaluateGeneration, JudgesASamplersPackageByTheDevicesOwnIntegers) {
   const TestFolder folder;
   tests::write_test_packages(folder);
-  evaluate::test::write_people(folder.path("people.fgn"),
+  features::test::write_people(folder.path("people.fgn"),
                                {.training = 4, .validation = 1, .test = 1});
   const ProgramRun made = tests::run_shell(
       FIGURINE_TRAIN
@@ -125,7 +125,7 @@ TEST(EvaluateGeneration, JudgesASamplersPackageByTheDevicesOwnIntegers) {
   EXPECT_EQ(report.at("runs").at(0).at("package").at("name"), "people");
   EXPECT_FALSE(report.at("runs").at(1).contains("package"));
 
-  evaluate::test::write_people(folder.path("others.fgn"),
+  features::test::write_people(folder.path("others.fgn"),
                                {.training = 4, .validation = 1, .test = 1, .other_from = 0});
   const ProgramRun refused = judge(folder, "--population others.fgn --sampler sampler.fgn");
   EXPECT_EQ(refused.exit_code, 1);
@@ -137,7 +137,7 @@ TEST(EvaluateGeneration, JudgesASamplersPackageByTheDevicesOwnIntegers) {
 TEST(EvaluateGeneration, BadInputGivesOneLineAndNoReport) {
   const TestFolder folder;
   tests::write_test_packages(folder);
-  evaluate::test::write_people(folder.path("three.fgn"),
+  features::test::write_people(folder.path("three.fgn"),
                                {.training = 3, .validation = 2, .test = 2});
   folder.write("text.pt", "no script");
   const auto refused = [&](const std::string& arguments, const std::string& wanted) {

@@ -6,7 +6,7 @@
 
 #include "gtest/gtest.h"
 #include "samples/program.h"
-#include "toolchain/evaluate/people.h"
+#include "toolchain/features/people.h"
 
 namespace figurine::cli {
 namespace {
@@ -17,7 +17,7 @@ using tests::TestFolder;
 // body.fgn and six.fgn: two members train, four are held out.
 void write_packages(const TestFolder& folder) {
   tests::write_test_packages(folder);
-  evaluate::test::write_people(folder.path("six.fgn"), {.training = 2, .validation = 2, .test = 2});
+  features::test::write_people(folder.path("six.fgn"), {.training = 2, .validation = 2, .test = 2});
 }
 
 ProgramRun train(const TestFolder& folder, const std::string& arguments) {

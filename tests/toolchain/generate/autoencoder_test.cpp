@@ -14,7 +14,7 @@
 namespace figurine::generate {
 namespace {
 
-using evaluate::RowMatrix;
+using measure::RowMatrix;
 
 constexpr size_t kWidth = 300;  // a picture of 24 x 24, with 276 values of padding
 

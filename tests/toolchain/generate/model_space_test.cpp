@@ -11,9 +11,9 @@
 namespace figurine::generate {
 namespace {
 
-using evaluate::RowMatrix;
-using evaluate::RowVector;
-using evaluate::Token;
+using measure::RowMatrix;
+using measure::RowVector;
+using measure::Token;
 
 // A repeatable matrix of normal numbers (sums of uniform ones).
 RowMatrix normal_rows(Eigen::Index rows, Eigen::Index columns, uint64_t seed) {

@@ -23,6 +23,7 @@
 #include "toolchain/tensor_operations.h"
 #include "toolchain/verify/device_samples.h"
 #include "toolchain/verify/float_sampler.h"
+#include "toolchain/verify/golden_seeds.h"
 #include "toolchain/verify/sampling_error.h"
 
 namespace figurine::generate {
@@ -64,7 +65,11 @@ class PackSampler : public testing::Test {
   }
   static std::string path(const std::string& name) { return (folder() / name).string(); }
   static PackSamplerOptions options() {
-    return {.run = path("run"), .body = path("body.fgn"), .steps = 8, .quiet = true};
+    return {.run = path("run"),
+            .body = path("body.fgn"),
+            .steps = 8,
+            .sample_on_device = verify::sample_golden_seeds,
+            .quiet = true};
   }
 
   static std::string refusal(const PackSamplerOptions& options) {
@@ -117,10 +122,10 @@ TEST_F(PackSampler, DirectionsAreTheSpacesButForTheirRounding) {
   const QuantisedSampler quantised(trained, {}, "people");
   std::vector<float> weights(quantised.view().mean.size());
   for (Eigen::Index m = 0; m < trained.training.rows(); ++m) {
-    const evaluate::RowVector values = trained.training.row(m);
+    const measure::RowVector values = trained.training.row(m);
     decode_weights(quantised.view(), {values.data(), static_cast<size_t>(values.size())}, weights);
-    const evaluate::RowVector truth = trained.space->decode(values),
-                              mean = trained.space->standardisation().mean();
+    const measure::RowVector truth = trained.space->decode(values),
+                             mean = trained.space->standardisation().mean();
     double error = 0, power = 0;
     for (Eigen::Index j = 0; j < truth.size(); ++j) {
       error += std::pow(double{weights[static_cast<size_t>(j)]} - truth[j], 2);
@@ -179,23 +184,23 @@ TEST_F(PackSampler, SeedsOfTheDeviceAreSeedsOfTheTrainersFloats) {
   const auto device = AvatarSampler::create(opened->sampler());
   ASSERT_TRUE(device.ok());
   const TrainedSampler trained = TrainedSampler::open(path("run"));
-  const evaluate::RowMatrix floats =
+  const measure::RowMatrix floats =
       verify::draw_weights(trained, {.first_seed = 3, .count = 2, .steps = 8});
-  const evaluate::RowMatrix sampled =
+  const measure::RowMatrix sampled =
       verify::sample_weights(opened->sampler(), {.first_seed = 3, .count = 2, .quiet = true});
   ASSERT_EQ(sampled.cols(), floats.cols());
   for (uint64_t seed = 3; seed < 5; ++seed) {
     SampledAvatar person;
     ASSERT_TRUE((*device)->sample({.seed = seed}, person).ok());
     std::vector<double> weights(static_cast<size_t>(floats.cols()));
-    evaluate::read_weights(person.avatar(), weights);
+    measure::read_weights(person.avatar(), weights);
     EXPECT_TRUE(std::ranges::equal(weights, sampled.row(static_cast<Eigen::Index>(seed - 3))))
         << "as evaluations see them";
-    const evaluate::RowVector mean = trained.space->standardisation().mean();
+    const measure::RowVector mean = trained.space->standardisation().mean();
     const auto row = floats.row(static_cast<Eigen::Index>(seed - 3));
     const double power = (row - mean).squaredNorm();
     const double error =
-        (Eigen::Map<const evaluate::RowVector>(weights.data(), row.size()) - row).squaredNorm();
+        (Eigen::Map<const measure::RowVector>(weights.data(), row.size()) - row).squaredNorm();
     std::printf("  seed %llu: relative error %.3f\n", static_cast<unsigned long long>(seed),
                 std::sqrt(error / power));
     EXPECT_LT(std::sqrt(error / power), 0.1);

@@ -156,7 +156,7 @@ TEST_F(SamplerTraining, GoesOnWithTheSameBitsFromTheAutoencoder) {
   EXPECT_NEAR(sampler.training.squaredNorm() / static_cast<double>(sampler.training.size()), 1,
               1e-9)
       << "of unit scale";
-  const evaluate::RowVector back = sampler.space->decode(sampler.training.row(0));
+  const measure::RowVector back = sampler.space->decode(sampler.training.row(0));
   EXPECT_EQ(back.size(), sampler.space->standardisation().mean().size());
   EXPECT_TRUE(back.array().isFinite().all());
   fs::remove(path("cut") + "/autoencoder.safetensors");

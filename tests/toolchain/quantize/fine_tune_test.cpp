@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/toolchain/train/small_capture.h"
-#include "toolchain/evaluate/quantization.h"
 #include "toolchain/model/fake_quantisation.h"
+#include "toolchain/reconstruction/quantization.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
@@ -105,16 +105,17 @@ TEST(FineTune, LeavesTheRunAloneAndIsNotRepeated) {
 TEST(EvaluateQuantization, ReportsEveryRowAndTheIntegersAgree) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = trained_run()});
   const torch::Tensor before = avatar.model().unet().weights().detach().clone();
-  const nlohmann::json report = evaluate::evaluate_quantization(avatar, {trained_run()},
-                                                                {.calibration = {.poses = 8},
-                                                                 .fine_tune = short_fine_tune(),
-                                                                 .motion = "",
-                                                                 .views_per_pose = 2,
-                                                                 .training_poses = 2,
-                                                                 .quiet = true});
+  const nlohmann::json report =
+      reconstruction::evaluate_quantization(avatar, {trained_run()},
+                                            {.calibration = {.poses = 8},
+                                             .fine_tune = short_fine_tune(),
+                                             .motion = "",
+                                             .views_per_pose = 2,
+                                             .training_poses = 2,
+                                             .quiet = true});
   EXPECT_TRUE(torch::equal(before, avatar.model().unet().weights().detach()))
       << "the evaluation gives the network back as it was";
-  const nlohmann::json summary = evaluate::summarise_quantization({report, report});
+  const nlohmann::json summary = reconstruction::summarise_quantization({report, report});
   for (const char* name : {"ptq", "ptq_minmax", "ptq_percentile", "ptq_mse", "qat", "dynamic",
                            "ptq_int8_input", "ptq_float_head"}) {
     const auto row = std::find_if(summary.at("rows").begin(), summary.at("rows").end(),

@@ -1,56 +1,16 @@
-// The order of images, the learning rate, the pose statistics: everything a resumed run has to
+// The learning rate, the pose statistics: everything a resumed run has to
 // repeat.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <set>
 
 #include "toolchain/train/pack_avatar.h"
-#include "toolchain/train/random.h"
 #include "toolchain/train/schedule.h"
 
 namespace figurine::train {
 namespace {
-
-TEST(ShuffledOrder, VisitsEveryItemOncePerEpochInAFreshOrder) {
-  ShuffledOrder order(7, 100);
-  std::vector<size_t> first, second;
-  for (uint64_t i = 0; i < 100; ++i) first.push_back(order.item(i));
-  for (uint64_t i = 100; i < 200; ++i) second.push_back(order.item(i));
-  EXPECT_EQ(std::set<size_t>(first.begin(), first.end()).size(), 100u);
-  EXPECT_EQ(std::set<size_t>(second.begin(), second.end()).size(), 100u);
-  EXPECT_NE(first, second);
-}
-
-TEST(ShuffledOrder, DependsOnIterationAloneNotOnWhatWasAskedBefore) {
-  ShuffledOrder straight(3, 41), jumping(3, 41);
-  std::vector<size_t> expected;
-  for (uint64_t i = 0; i < 200; ++i) expected.push_back(straight.item(i));
-  for (uint64_t i : {150u, 3u, 199u, 77u, 150u}) EXPECT_EQ(jumping.item(i), expected[i]);
-}
-
-TEST(ShuffledOrder, DiffersBySeed) {
-  ShuffledOrder a(1, 1000), b(2, 1000);
-  int equal = 0;
-  for (uint64_t i = 0; i < 1000; ++i) equal += a.item(i) == b.item(i);
-  EXPECT_LT(equal, 20);
-}
-
-TEST(RandomUnit, IsUniformWithinSamplingError) {
-  double sum = 0, squares = 0;
-  constexpr int kCount = 100000;
-  for (uint64_t i = 0; i < kCount; ++i) {
-    const double value = random_unit(5, 1, i);
-    ASSERT_GE(value, 0);
-    ASSERT_LT(value, 1);
-    sum += value;
-    squares += value * value;
-  }
-  EXPECT_NEAR(sum / kCount, 0.5, 5 * std::sqrt(1.0 / 12 / kCount));
-  EXPECT_NEAR(squares / kCount, 1.0 / 3, 0.005);
-}
 
 TEST(Schedule, RampsThenFollowsTheCosineToItsFloor) {
   const Schedule schedule{.peak = 1e-3,

@@ -9,7 +9,7 @@
 
 #include "tests/toolchain/train/small_capture.h"
 #include "toolchain/error.h"
-#include "toolchain/evaluate/reconstruction.h"
+#include "toolchain/reconstruction/reconstruction.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/lanes.h"
@@ -64,7 +64,7 @@ const std::string& trained_run() {
 
 TEST(Training, BeatsAFlatColourOnHeldOutViewsAndPoses) {
   TrainedAvatar avatar = TrainedAvatar::open({.run = trained_run()});
-  const nlohmann::json report = evaluate::evaluate_reconstruction(avatar, {.quiet = true});
+  const nlohmann::json report = reconstruction::evaluate_reconstruction(avatar, {.quiet = true});
   for (const char* group : {"held_out_views", "held_out_poses"}) {
     const double psnr = report.at(group).at("psnr_db"), flat = report.at(group).at("flat_psnr_db");
     std::printf("%s: %.2f dB, flat colour %.2f dB\n", group, psnr, flat);

@@ -1,0 +1,171 @@
+#include "toolchain/pictures/contact_sheet.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "toolchain/error.h"
+#include "toolchain/pictures/avatar_pictures.h"
+
+namespace figurine::pictures {
+
+using measure::bounding_box;
+using measure::Box;
+using measure::kMidGrey;
+using measure::Picture;
+
+namespace {
+
+constexpr int kGap_px = 4;
+constexpr float kPersonMargin = 0.03f, kDetailMargin = 0.25f;  // of the box's side
+
+// The box grown to width = aspect * height around its centre, then by the margin.
+Box framed(const Box& box, float aspect, float margin) {
+  const float cx = 0.5f * float(box.x0 + box.x1), cy = 0.5f * float(box.y0 + box.y1);
+  float width = float(box.x1 - box.x0) * (1 + 2 * margin),
+        height = float(box.y1 - box.y0) * (1 + 2 * margin);
+  if (width < aspect * height) {
+    width = aspect * height;
+  } else {
+    height = width / aspect;
+  }
+  return {
+      static_cast<int>(std::floor(cx - width / 2)), static_cast<int>(std::floor(cy - height / 2)),
+      static_cast<int>(std::ceil(cx + width / 2)), static_cast<int>(std::ceil(cy + height / 2))};
+}
+
+float sample(const Picture& picture, int x, int y, int channel) {
+  if (x < 0 || y < 0 || x >= int(picture.width_px) || y >= int(picture.height_px)) return kMidGrey;
+  const uint8_t* p = &picture.rgba[(size_t(y) * picture.width_px + x) * 4];
+  return (float(p[channel]) + float(255 - p[3]) * kMidGrey) / 255.0f;
+}
+
+// Scales `box` of the picture into the sheet's rectangle: bilinear, half-pixel centres.
+// Down-scaling by more than two would alias; boxes are not that large.
+void paste(const Picture& picture, const Box& box, ports::ImageU8& sheet, uint32_t x0, uint32_t y0,
+           uint32_t width, uint32_t height) {
+  for (uint32_t y = 0; y < height; ++y) {
+    for (uint32_t x = 0; x < width; ++x) {
+      const float sx =
+          float(box.x0) + (float(x) + 0.5f) * float(box.x1 - box.x0) / float(width) - 0.5f;
+      const float sy =
+          float(box.y0) + (float(y) + 0.5f) * float(box.y1 - box.y0) / float(height) - 0.5f;
+      const int ix = static_cast<int>(std::floor(sx)), iy = static_cast<int>(std::floor(sy));
+      const float fx = sx - float(ix), fy = sy - float(iy);
+      for (int c = 0; c < 3; ++c) {
+        const float top =
+            sample(picture, ix, iy, c) * (1 - fx) + sample(picture, ix + 1, iy, c) * fx;
+        const float bottom =
+            sample(picture, ix, iy + 1, c) * (1 - fx) + sample(picture, ix + 1, iy + 1, c) * fx;
+        sheet.at(x0 + x, y0 + y)[c] = static_cast<uint8_t>(
+            std::clamp(top * (1 - fy) + bottom * fy, 0.0f, 1.0f) * 255.0f + 0.5f);
+      }
+    }
+  }
+}
+
+// How straight the person looks into the camera: the cosine between the head's forward axis and the
+// way to the camera.
+float facing(const train::TrainedAvatar& avatar, size_t frame, const Camera& camera) {
+  const train::OwnedPose pose = avatar.model().from_capture(avatar.data().frames()[frame]);
+  const Affine head = avatar.model().pose(pose.view()).world_from_rest[head_joints().front()];
+  const auto& m = camera.view_from_world;
+  float dot = 0;
+  for (int k = 0; k < 3; ++k)
+    dot -= head.m[4 * k + 2] *
+           m[8 + k];  // rest forward is +z; the camera looks along its own third row
+  return dot;
+}
+
+std::vector<std::pair<size_t, size_t>> choose_pictures(const train::TrainedAvatar& avatar,
+                                                       size_t count) {
+  const dataset::Dataset& data = avatar.data();
+  std::vector<std::pair<size_t, size_t>> both, any;
+  for (size_t frame = 0; frame < data.frames().size(); ++frame) {
+    for (size_t camera = 0; camera < data.cameras().size(); ++camera) {
+      const dataset::Role role = data.role(frame, camera);
+      if (role == dataset::Role::kHeldOutViewAndPose) both.emplace_back(frame, camera);
+      if (role != dataset::Role::kTrain) any.emplace_back(frame, camera);
+    }
+  }
+  const auto& from = both.empty() ? any : both;
+  if (from.empty())
+    throw InputError(data.directory() + ": nothing is held out, so there is nothing to show");
+  // Evenly over the frames; every other picture from the camera that sees most of the face, the
+  // others one camera further each time.
+  std::vector<size_t> starts;  // of each frame's stretch of the list
+  for (size_t i = 0; i < from.size(); ++i) {
+    if (i == 0 || from[i].first != from[i - 1].first) starts.push_back(i);
+  }
+  std::vector<std::pair<size_t, size_t>> chosen;
+  for (size_t i = 0; i < count; ++i) {
+    const size_t at = i * starts.size() / count,
+                 end = at + 1 < starts.size() ? starts[at + 1] : from.size();
+    size_t pick = starts[at] + i % (end - starts[at]);
+    for (size_t k = starts[at]; i % 2 == 0 && k < end; ++k) {
+      const auto sees = [&](size_t candidate) {
+        return facing(avatar, from[candidate].first, data.cameras()[from[candidate].second].camera);
+      };
+      if (sees(k) > sees(pick)) pick = k;
+    }
+    chosen.push_back(from[pick]);
+  }
+  return chosen;
+}
+
+}  // namespace
+
+ports::ImageU8 make_contact_sheet(train::TrainedAvatar& avatar,
+                                  const ContactSheetOptions& options) {
+  const dataset::Dataset& data = avatar.data();
+  struct Pair {
+    Picture truth, prediction;
+    Box person, face, hand;
+  };
+  std::vector<Pair> pairs;
+  float aspect = 0.3f;  // width over height of the widest person
+  for (const auto& [frame, camera] : choose_pictures(avatar, options.pairs)) {
+    const Camera& view = data.cameras()[camera].camera;
+    const PosedFrame posed = pose_frame(avatar, frame);
+    Pair pair{.truth = true_picture(data, frame, camera),
+              .prediction = render_picture(avatar, posed, view),
+              .person = {},
+              .face = {},
+              .hand = {}};
+    pair.person = bounding_box(pair.truth);
+    if (pair.person.empty()) pair.person = {0, 0, int(view.width_px), int(view.height_px)};
+    pair.face = projected_box(avatar.model(), posed.posed, view, head_joints(), 0);
+    pair.hand = projected_box(avatar.model(), posed.posed, view, left_hand_joints(), 0);
+    aspect = std::max(
+        aspect, float(pair.person.x1 - pair.person.x0) / float(pair.person.y1 - pair.person.y0));
+    pairs.push_back(std::move(pair));
+  }
+  const auto tile_width =
+      static_cast<uint32_t>(std::ceil(aspect * float(options.person_height_px)));
+  const uint32_t detail_width = std::min(tile_width, options.detail_height_px);
+  const uint32_t pair_width = 2 * tile_width + 2 * kGap_px;
+  ports::ImageU8 sheet(pair_width * uint32_t(pairs.size()) + kGap_px,
+                       options.person_height_px + 2 * options.detail_height_px + 4 * kGap_px, 3);
+  std::fill(sheet.pixels.begin(), sheet.pixels.end(), uint8_t{255});
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    const Pair& pair = pairs[i];
+    for (int side = 0; side < 2; ++side) {
+      const Picture& picture = side == 0 ? pair.truth : pair.prediction;
+      const uint32_t x = kGap_px + uint32_t(i) * pair_width + side * (tile_width + kGap_px / 2);
+      const float person_aspect = float(tile_width) / float(options.person_height_px);
+      paste(picture, framed(pair.person, person_aspect, kPersonMargin), sheet, x, kGap_px,
+            tile_width, options.person_height_px);
+      const uint32_t centred = x + (tile_width - detail_width) / 2;
+      uint32_t y = options.person_height_px + 2 * kGap_px;
+      for (const Box& detail : {pair.face, pair.hand}) {
+        const float detail_aspect = float(detail_width) / float(options.detail_height_px);
+        if (!detail.empty())
+          paste(picture, framed(detail, detail_aspect, kDetailMargin), sheet, centred, y,
+                detail_width, options.detail_height_px);
+        y += options.detail_height_px + kGap_px;
+      }
+    }
+  }
+  return sheet;
+}
+
+}  // namespace figurine::pictures

@@ -1,0 +1,26 @@
+// Held-out pictures beside the truth, for people to look at: truth left, prediction right in every
+// pair.
+//
+//   row 1  held-out poses from held-out cameras, whole person
+//   row 2  the same pictures' faces
+//   row 3  the same pictures' left hands
+// Tiles are cut from the picture over mid-grey and scaled to one height (bilinear), never
+// sharpened.
+#pragma once
+
+#include "ports/media/image.h"
+#include "toolchain/train/trained_avatar.h"
+
+namespace figurine::pictures {
+
+struct ContactSheetOptions {
+  uint32_t pairs = 4;
+  uint32_t person_height_px = 480;
+  uint32_t detail_height_px = 160;
+};
+
+// RGB. Poses and cameras are spread over what is held out; if nothing is held out in both ways,
+// over any held-out picture. Deterministic.
+ports::ImageU8 make_contact_sheet(train::TrainedAvatar& avatar, const ContactSheetOptions& options);
+
+}  // namespace figurine::pictures

@@ -1,0 +1,156 @@
+#include "toolchain/reconstruction/reconstruction.h"
+
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "toolchain/error.h"
+#include "toolchain/pictures/avatar_pictures.h"
+#include "toolchain/train/interrupt.h"
+#include "toolchain/train/progress.h"
+
+namespace figurine::reconstruction {
+
+using measure::Box;
+using measure::compare_outlines;
+using measure::crop_error;
+using measure::difference_error;
+using measure::FlatColour;
+using measure::foreground_error;
+using measure::high_pass;
+using measure::HighPass;
+using measure::Outline;
+using measure::Picture;
+using measure::SquaredError;
+using pictures::head_joints;
+using pictures::pose_frame;
+using pictures::PosedFrame;
+using pictures::projected_box;
+using pictures::render_picture;
+using pictures::true_picture;
+
+namespace {
+
+constexpr float kHeadEnlarge =
+    0.15f;  // hair and beard stand out from the skin that the box is drawn around
+
+struct Group {
+  SquaredError foreground, crop, head;
+  HighPass sharpness, head_sharpness;
+  Outline outline;
+  FlatColour flat;
+  uint64_t images = 0;
+
+  void add(const Picture& prediction, const Picture& truth, const Box& head_box) {
+    foreground.add(foreground_error(prediction, truth));
+    crop.add(crop_error(prediction, truth));
+    sharpness.add(high_pass(prediction, truth));
+    if (!head_box.empty()) {
+      head.add(foreground_error(prediction, truth, head_box));
+      head_sharpness.add(high_pass(prediction, truth, head_box));
+    }
+    outline.add(compare_outlines(prediction, truth));
+    flat.add(truth);
+    ++images;
+  }
+};
+
+// JSON has no infinity and no NaN: equal pictures and absent pixels become null.
+nlohmann::json finite(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
+nlohmann::json to_json(const Group& group) {
+  return {{"images", group.images},
+          {"psnr_db", finite(group.foreground.psnr_db())},
+          {"flat_psnr_db", finite(group.flat.error().psnr_db())},
+          {"crop_psnr_db", finite(group.crop.psnr_db())},
+          {"head_psnr_db", finite(group.head.psnr_db())},
+          {"highpass_ratio", finite(group.sharpness.ratio())},
+          {"head_highpass_ratio", finite(group.head_sharpness.ratio())},
+          {"mask_iou", group.outline.iou()},
+          {"uncovered_share", group.outline.uncovered_share()}};
+}
+
+// The groups that an image of this role counts for.
+std::vector<std::string> groups_of(dataset::Role role) {
+  switch (role) {
+    case dataset::Role::kTrain:
+      return {};
+    case dataset::Role::kHeldOutView:
+      return {"held_out_views"};
+    case dataset::Role::kHeldOutPoseInterleaved:
+      return {"held_out_poses", "held_out_poses_interleaved"};
+    case dataset::Role::kHeldOutPoseBlock:
+      return {"held_out_poses", "held_out_poses_block"};
+    case dataset::Role::kHeldOutViewAndPose:
+      return {"held_out_views_and_poses"};
+  }
+  return {};
+}
+
+}  // namespace
+
+nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
+                                       const ReconstructionOptions& options) {
+  const dataset::Dataset& data = avatar.data();
+  const size_t cameras = data.cameras().size(), frames = data.frames().size();
+  std::map<std::string, Group> groups;
+  SquaredError difference;
+  // Per camera the picture of the block frame before, for the frame differences.
+  struct Before {
+    size_t frame = 0;
+    Picture prediction, truth;
+  };
+  std::vector<std::optional<Before>> before(cameras);
+  train::Progress progress("evaluate", options.quiet);
+  const train::InterruptGuard interrupt;
+  size_t training_frames = 0;
+  for (size_t frame = 0; frame < frames; ++frame) {
+    const dataset::FrameSplit split = data.frames()[frame].split;
+    if (split == dataset::FrameSplit::kTrain && training_frames++ % options.view_frame_step != 0)
+      continue;
+    std::optional<PosedFrame> posed;
+    for (size_t camera = 0; camera < cameras; ++camera) {
+      const dataset::Role role = data.role(frame, camera);
+      if (role == dataset::Role::kTrain) continue;
+      if (interrupt.requested()) throw train::Interrupted("evaluate: stopped; nothing was written");
+      if (!posed) posed = pose_frame(avatar, frame);
+      const Camera& view = data.cameras()[camera].camera;
+      const Picture prediction = render_picture(avatar, *posed, view);
+      const Picture truth = true_picture(data, frame, camera);
+      const Box head_box =
+          projected_box(avatar.model(), posed->posed, view, head_joints(), kHeadEnlarge);
+      for (const std::string& name : groups_of(role)) groups[name].add(prediction, truth, head_box);
+      if (split == dataset::FrameSplit::kBlock) {
+        std::optional<Before>& last = before[camera];
+        if (last && last->frame + 1 == frame)
+          difference.add(difference_error(last->prediction, prediction, last->truth, truth));
+        last = Before{frame, prediction, truth};
+      }
+    }
+    progress.show(double(frame + 1) / double(frames),
+                  "frame " + std::to_string(frame + 1) + " of " + std::to_string(frames));
+  }
+  if (groups.empty())
+    throw InputError(data.directory() + ": nothing is held out, so there is nothing to evaluate");
+  nlohmann::json report = nlohmann::json::object();
+  for (const char* name : {"held_out_views", "held_out_poses", "held_out_poses_interleaved",
+                           "held_out_poses_block", "held_out_views_and_poses"}) {
+    report[name] = to_json(groups[name]);
+  }
+  report["difference_psnr_db"] = finite(difference.psnr_db());
+  report["definition"] =
+      "PSNR over pixels whose true alpha exceeds 0.5, on stored sRGB values, over mid-grey, pooled "
+      "MSE; flat: one colour with a perfect "
+      "mask; crop: bounding box "
+      "of the mask, over black; head: projected box of the head's texels, 15 % larger; high-pass: "
+      "energy of (picture - 3x3 binomial) "
+      "inside the mask, "
+      "prediction over truth; difference: PSNR of consecutive frames' differences in the held-out "
+      "block";
+  return report;
+}
+
+}  // namespace figurine::reconstruction
