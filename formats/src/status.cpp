@@ -28,4 +28,15 @@ const char* to_string(StatusCode code) {
   return "unknown status";
 }
 
+Status::Status(StatusCode code, std::string message) : code_(code), message_(std::move(message)) {}
+Status::Status(const Status& other) = default;
+Status::Status(Status&& other) noexcept = default;
+Status& Status::operator=(const Status& other) = default;
+Status& Status::operator=(Status&& other) noexcept = default;
+Status::~Status() = default;
+
+void detail::no_value(const Status& status) {
+  check_failed(__FILE__, __LINE__, status.message().c_str(), "the Result has a value");
+}
+
 }  // namespace figurine

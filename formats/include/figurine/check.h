@@ -11,8 +11,8 @@ using CheckHandler = void (*)(const char* message, void* user);
 void set_check_handler(CheckHandler handler, void* user);
 
 // What FIG_CHECK calls: tells the handler, then aborts.
-[[noreturn]] void check_failed(const char* file, int line, const char* message,
-                               const char* condition);
+[[noreturn, gnu::cold]] void check_failed(const char* file, int line, const char* message,
+                                          const char* condition);
 
 }  // namespace figurine
 
