@@ -28,6 +28,9 @@ install(FILES "${PROJECT_SOURCE_DIR}/cmake/figurine-config.cmake"
     "${CMAKE_CURRENT_BINARY_DIR}/figurine-config-version.cmake"
   DESTINATION "${package}" COMPONENT development)
 
+install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}"
+  COMPONENT runtime)
+
 # From the files' own place to the prefix, however deep the library folder is.
 file(RELATIVE_PATH prefix_from_pc "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 foreach(name figurine figurine-runtime)

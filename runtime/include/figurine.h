@@ -6,10 +6,10 @@
  * never followed, whatever came after it at the same place. Whatever is still in use cannot be
  * removed: the call says so, and nothing happens.
  *
- * Structs begin with their size, which fig_default_*() fills in with every other default, so that a
- * program goes on to run with later versions, whose structs are longer. Where a struct is an
- * option, NULL stands for its default. Structs that a function fills must come from their default
- * too.
+ * Structs begin with their size, and come from fig_default_NAME(), which fills that in with every
+ * other default: so a program goes on to run with later versions, whose structs are longer. That
+ * is true of structs that a function fills as well. Where a struct is an option, NULL stands for
+ * its default.
  *
  * Functions return FIG_OK or what went wrong; fig_last_message() then says it in one line, and
  * nothing was changed. There are no exceptions, files, clocks or environment. Different handles may
@@ -36,6 +36,16 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* fig_NAME fig_default_NAME(void): the size is that of the program's own struct. For languages that
+ * read no inline functions, the one behind it is there. */
+#define FIG_DEFAULT(name)                                                      \
+  FIG_API void fig_set_default_##name(fig_##name* value, size_t struct_bytes); \
+  static inline fig_##name fig_default_##name(void) {                          \
+    fig_##name value;                                                          \
+    fig_set_default_##name(&value, sizeof value);                              \
+    return value;                                                              \
+  }
 
 #define FIG_VERSION_MAJOR 0
 #define FIG_VERSION_MINOR 2
@@ -109,7 +119,7 @@ typedef struct fig_package_options {
   int copy;         /* 0: the bytes are borrowed, must start at a multiple of 64 and stay unchanged
                        until fig_package_close; 1: the library keeps a copy of its own */
 } fig_package_options;
-FIG_API fig_package_options fig_default_package_options(void);
+FIG_DEFAULT(package_options)
 
 /* Opens a package and verifies all of it; after that, nothing that reads it can fail. */
 FIG_API fig_status fig_package_open(const void* bytes, size_t size_bytes,
@@ -133,7 +143,7 @@ typedef struct fig_package_info {
   float frames_per_second;    /* of a motion */
   int holds_f32, holds_q8;    /* 1 if its network, or its members', is there in this precision */
 } fig_package_info;
-FIG_API fig_package_info fig_default_package_info(void);
+FIG_DEFAULT(package_info)
 FIG_API fig_status fig_package_get_info(fig_package package, fig_package_info* info);
 
 typedef struct fig_joint {
@@ -142,7 +152,7 @@ typedef struct fig_joint {
   int32_t parent;           /* an earlier joint; -1 of the root, joint 0 */
   float rest_position_m[3]; /* of the mean template */
 } fig_joint;
-FIG_API fig_joint fig_default_joint(void);
+FIG_DEFAULT(joint)
 FIG_API fig_status fig_package_joint(fig_package body, uint32_t joint, fig_joint* info);
 
 /* A population's members, by number from 0 to member_count - 1. */
@@ -160,7 +170,7 @@ typedef struct fig_pose {
   uint32_t joint_count;        /* J, as the body has it */
   const float* rotations;      /* [J,4] quaternions relative to the parent joint, of any length */
 } fig_pose;
-FIG_API fig_pose fig_default_pose(void);
+FIG_DEFAULT(pose)
 
 typedef struct fig_camera {
   size_t struct_bytes;
@@ -170,7 +180,7 @@ typedef struct fig_camera {
   float view_from_world[12]; /* [3,4] row-major: x_view = R x_world + t, R a rotation */
   float near_m;              /* what is nearer is not drawn */
 } fig_camera;
-FIG_API fig_camera fig_default_camera(void);
+FIG_DEFAULT(camera)
 
 typedef struct fig_orbit {
   size_t struct_bytes;
@@ -180,7 +190,7 @@ typedef struct fig_orbit {
   float vertical_fov_deg; /* 1 to 170 */
   float target_m[3];
 } fig_orbit;
-FIG_API fig_orbit fig_default_orbit(void);
+FIG_DEFAULT(orbit)
 
 /* A camera on a sphere around the target that looks at it. */
 FIG_API fig_status fig_make_orbit_camera(const fig_orbit* orbit, uint32_t width_px,
@@ -227,7 +237,7 @@ typedef struct fig_renderer_options {
   uint64_t (*now_ns)(void* now_user);
   void* now_user;
 } fig_renderer_options;
-FIG_API fig_renderer_options fig_default_renderer_options(void);
+FIG_DEFAULT(renderer_options)
 
 FIG_API fig_status fig_renderer_create(const fig_renderer_options* options, fig_renderer* renderer);
 /* With all of its avatars, whose handles are refused from then on. */
@@ -244,7 +254,7 @@ typedef struct fig_avatar_options {
   size_t struct_bytes;
   fig_precision precision;
 } fig_avatar_options;
-FIG_API fig_avatar_options fig_default_avatar_options(void);
+FIG_DEFAULT(avatar_options)
 
 /* Readies an avatar for frames: an avatar package, or member `member` of a population (in float
  * alone; of an avatar, 0). Both packages stay open until it is removed. An avatar that is added
@@ -265,7 +275,7 @@ typedef struct fig_renderer_info {
   uint32_t avatar_count; /* that are there now */
   uint64_t memory_bytes; /* held now, the network library's part estimated */
 } fig_renderer_info;
-FIG_API fig_renderer_info fig_default_renderer_info(void);
+FIG_DEFAULT(renderer_info)
 FIG_API fig_status fig_renderer_get_info(fig_renderer renderer, fig_renderer_info* info);
 /* FIG_PRECISION_F32 or FIG_PRECISION_Q8. */
 FIG_API fig_status fig_renderer_avatar_precision(fig_renderer renderer, fig_avatar avatar,
@@ -301,7 +311,7 @@ typedef struct fig_image {
   size_t chroma_stride_bytes; /* of those rows */
   fig_matrix matrix;          /* of FIG_PIXEL_YUYV and FIG_PIXEL_NV12; FIG_MATRIX_BT709 */
 } fig_image;
-FIG_API fig_image fig_default_image(void);
+FIG_DEFAULT(image)
 
 /* An avatar in its pose. In an array all elements have the first's struct_bytes. */
 typedef struct fig_frame_avatar {
@@ -309,7 +319,7 @@ typedef struct fig_frame_avatar {
   fig_avatar avatar;
   const fig_pose* pose;
 } fig_frame_avatar;
-FIG_API fig_frame_avatar fig_default_frame_avatar(void);
+FIG_DEFAULT(frame_avatar)
 
 /* Gaussians in world space. In an array all elements have the first's struct_bytes. */
 typedef struct fig_gaussians {
@@ -321,7 +331,7 @@ typedef struct fig_gaussians {
   const float* opacity;           /* [n] in [0,1] */
   const float* sh;                /* [n,(d+1)^2,3] coefficients, RGB innermost */
 } fig_gaussians;
-FIG_API fig_gaussians fig_default_gaussians(void);
+FIG_DEFAULT(gaussians)
 
 /* What a frame need not compute because nobody would see it. The picture is the same to the bit
  * with and without: a switch is for measuring what it is worth. */
@@ -346,7 +356,7 @@ typedef struct fig_frame {
   float alpha_cut;         /* contributions below it are skipped; in (0, 0.5]; 1/255 */
   uint32_t leave_out;      /* bits of fig_leave_out; FIG_LEAVE_OUT_ALL */
 } fig_frame;
-FIG_API fig_frame fig_default_frame(void);
+FIG_DEFAULT(frame)
 
 /* Draws a frame. After an error nothing was drawn. Allocates nothing once a frame of the same
  * content was drawn, and gives the same pixels for any number of threads. */
@@ -371,7 +381,7 @@ typedef struct fig_statistics {
   /* Left out: texels; Gaussians; Gaussians; pairs of boxes; pairs behind opaque tiles. */
   uint64_t hidden_texels, transparent, outside, missed_tiles, stopped;
 } fig_statistics;
-FIG_API fig_statistics fig_default_statistics(void);
+FIG_DEFAULT(statistics)
 FIG_API fig_status fig_renderer_statistics(fig_renderer renderer, fig_statistics* statistics);
 
 /* ---- Sampling -------------------------------------------------------------------------------- */
@@ -384,7 +394,7 @@ typedef struct fig_sampler_options {
   size_t struct_bytes;
   fig_isa isa; /* FIG_ISA_BEST */
 } fig_sampler_options;
-FIG_API fig_sampler_options fig_default_sampler_options(void);
+FIG_DEFAULT(sampler_options)
 
 /* Of a sampler package, which stays open until the sampler is destroyed. */
 FIG_API fig_status fig_sampler_create(fig_package package, const fig_sampler_options* options,
@@ -406,7 +416,7 @@ typedef struct fig_sample_options {
   uint32_t steps; /* 1 to 1000; 0: the package's */
   fig_solver solver;
 } fig_sample_options;
-FIG_API fig_sample_options fig_default_sample_options(void);
+FIG_DEFAULT(sample_options)
 
 /* The avatar of a seed: the same weights on every CPU. It outlives the sampler, but keeps the
  * package open until it is destroyed. */
@@ -422,7 +432,7 @@ typedef struct fig_sampled_info {
   const float* shape;       /* [shape_count] coefficients; arrays are valid until it is destroyed */
   uint64_t weights_hash[2]; /* XXH3-128 of all that the avatar in fixed point is decided by */
 } fig_sampled_info;
-FIG_API fig_sampled_info fig_default_sampled_info(void);
+FIG_DEFAULT(sampled_info)
 FIG_API fig_status fig_sampled_get_info(fig_sampled sampled, fig_sampled_info* info);
 
 /* One convolution of its network, in float and in fixed point. */
@@ -435,7 +445,7 @@ typedef struct fig_convolution {
   const float* q8_scale;    /* [out] */
   const int32_t* q8_bias;   /* [out] */
 } fig_convolution;
-FIG_API fig_convolution fig_default_convolution(void);
+FIG_DEFAULT(convolution)
 FIG_API fig_status fig_sampled_convolution(fig_sampled sampled, uint32_t convolution,
                                            fig_convolution* info);
 

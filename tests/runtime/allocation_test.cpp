@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstdlib>
 
+#include "figurine.h"
 #include "runtime/splat_scene.h"
 #include "runtime/test_packages.h"
 
@@ -174,6 +175,38 @@ void expect_memory_is_what_was_taken(Held held) {
 }
 
 // By content: packages read twice and storage used again are what they hold.
+TEST(Allocation, TheInterfaceInCAllocatesNothingEither) {
+  if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
+  const SyntheticBody test_body = make_test_body({});
+  const SyntheticAvatar test_avatar = make_test_avatar(test_body, {});
+  const auto open = [](std::span<const std::byte> bytes) {
+    fig_package package{};
+    EXPECT_EQ(fig_package_open(bytes.data(), bytes.size(), nullptr, &package), FIG_OK);
+    return package;
+  };
+  const fig_package body = open(test_body.bytes.bytes()), avatar = open(test_avatar.bytes.bytes());
+  fig_renderer renderer{};
+  ASSERT_EQ(fig_renderer_create(nullptr, &renderer), FIG_OK);
+  fig_pose pose = fig_default_pose();
+  fig_camera camera = fig_default_camera();
+  ASSERT_EQ(fig_package_golden_view(avatar, 0, &camera, &pose), FIG_OK);
+  std::vector<fig_frame_avatar> seen(101, fig_default_frame_avatar());
+  ASSERT_EQ(fig_renderer_add_avatar(renderer, avatar, 0, body, nullptr, &seen[0].avatar), FIG_OK);
+  for (fig_frame_avatar& one : seen) one.avatar = seen[0].avatar, one.pose = &pose;
+  fig_frame frame = fig_default_frame();
+  frame.camera = &camera, frame.avatars = seen.data(), frame.avatar_count = seen.size();
+  std::vector<uint8_t> rgba(size_t{4} * camera.width_px * camera.height_px);
+  fig_image image = fig_default_image();
+  image.pixels = rgba.data(), image.stride_bytes = size_t{4} * camera.width_px;
+  ASSERT_EQ(fig_renderer_render(renderer, &frame, &image), FIG_OK) << fig_last_message();
+  const uint64_t after_first = g_allocations;
+  ASSERT_EQ(fig_renderer_render(renderer, &frame, &image), FIG_OK);
+  EXPECT_EQ(g_allocations - after_first, 0u);
+  EXPECT_EQ(fig_renderer_destroy(renderer), FIG_OK);
+  EXPECT_EQ(fig_package_close(avatar), FIG_OK);
+  EXPECT_EQ(fig_package_close(body), FIG_OK);
+}
+
 TEST(Allocation, WhatIsAddedAgainIsHeldOnce) {
   const SyntheticBody body = make_test_body({.uv_size = 32});
   for (const Held held : {Held::kFloat32, Held::kFixedPoint}) {

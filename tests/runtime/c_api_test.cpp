@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -618,6 +619,27 @@ TEST_F(CApi, StructsOfAnotherSizeAreRefused) {
   both(info.struct_bytes, [&] { return fig_package_get_info(body, &info); });
   fig_orbit orbit = fig_default_orbit();
   both(orbit.struct_bytes, [&] { return fig_make_orbit_camera(&orbit, 4, 4, &camera); });
+}
+
+// A program that was built with a later version's header and runs with this library.
+TEST_F(CApi, ALongerStructIsFilledWithinItsSizeAndRefused) {
+  struct Later {
+    fig_frame frame;
+    uint64_t added, behind;
+  } later;
+  std::memset(&later, 0x5a, sizeof later);
+  fig_set_default_frame(&later.frame, offsetof(Later, behind));
+  EXPECT_EQ(later.frame.struct_bytes, offsetof(Later, behind));
+  EXPECT_EQ(later.frame.alpha_cut, frame.alpha_cut);
+  EXPECT_EQ(later.added, 0u);
+  EXPECT_EQ(later.behind, 0x5a5a5a5a5a5a5a5au);
+  EXPECT_REFUSED(fig_renderer_render(renderer, &later.frame, &image), FIG_UNSUPPORTED,
+                 "frame: struct_bytes of ");
+  // An earlier one's shorter struct is not written past its end.
+  std::memset(&later, 0x5a, sizeof later);
+  fig_set_default_frame(&later.frame, offsetof(fig_frame, alpha_cut));
+  EXPECT_EQ(later.frame.struct_bytes, offsetof(fig_frame, alpha_cut));
+  EXPECT_EQ(later.frame.leave_out, 0x5a5a5a5au);
 }
 
 TEST_F(CApi, UnsoundValuesAreRefused) {

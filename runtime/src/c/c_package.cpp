@@ -127,24 +127,24 @@ Status check_kind(const Package& package, PackageKind wanted) {
 }
 
 Result<PoseView> pose_of(const fig_pose* given) {
-  const Result<fig_pose> pose = read_struct(given, fig_default_pose(), "pose");
-  if (!pose.ok()) return pose.status();
-  if (pose->rotations == nullptr) return invalid("pose: rotations is NULL");
-  const float* const t = pose->root_translation_m;
-  return PoseView{{t[0], t[1], t[2]}, {pose->rotations, size_t{4} * pose->joint_count}};
+  fig_pose pose = fig_default_pose();
+  FIG_RETURN_IF_ERROR(read_struct(given, "pose", pose));
+  if (pose.rotations == nullptr) return invalid("pose: rotations is NULL");
+  const float* const t = pose.root_translation_m;
+  return PoseView{{t[0], t[1], t[2]}, {pose.rotations, size_t{4} * pose.joint_count}};
 }
 
 Result<Camera> camera_of(const fig_camera* given) {
-  const Result<fig_camera> camera = read_struct(given, fig_default_camera(), "camera");
-  if (!camera.ok()) return camera.status();
-  Camera out{.width_px = camera->width_px,
-             .height_px = camera->height_px,
-             .fx_px = camera->fx_px,
-             .fy_px = camera->fy_px,
-             .cx_px = camera->cx_px,
-             .cy_px = camera->cy_px,
-             .near_m = camera->near_m};
-  std::copy_n(camera->view_from_world, out.view_from_world.size(), out.view_from_world.begin());
+  fig_camera camera = fig_default_camera();
+  FIG_RETURN_IF_ERROR(read_struct(given, "camera", camera));
+  Camera out{.width_px = camera.width_px,
+             .height_px = camera.height_px,
+             .fx_px = camera.fx_px,
+             .fy_px = camera.fy_px,
+             .cx_px = camera.cx_px,
+             .cy_px = camera.cy_px,
+             .near_m = camera.near_m};
+  std::copy_n(camera.view_from_world, out.view_from_world.size(), out.view_from_world.begin());
   return out;
 }
 
@@ -153,29 +153,41 @@ Result<Camera> camera_of(const fig_camera* given) {
 using namespace figurine;
 using namespace figurine::c;
 
-fig_package_options fig_default_package_options(void) {
+static fig_package_options default_package_options() {
   return {.struct_bytes = sizeof(fig_package_options), .name = "package", .copy = 0};
 }
+void fig_set_default_package_options(fig_package_options* value, size_t struct_bytes) {
+  set_default(default_package_options(), value, struct_bytes);
+}
 
-fig_package_info fig_default_package_info(void) {
+static fig_package_info default_package_info() {
   fig_package_info info{};
   info.struct_bytes = sizeof info;
   info.name = "";
   return info;
 }
-
-fig_joint fig_default_joint(void) {
-  return {.struct_bytes = sizeof(fig_joint), .name = "", .parent = -1, .rest_position_m = {}};
+void fig_set_default_package_info(fig_package_info* value, size_t struct_bytes) {
+  set_default(default_package_info(), value, struct_bytes);
 }
 
-fig_pose fig_default_pose(void) {
+static fig_joint default_joint() {
+  return {.struct_bytes = sizeof(fig_joint), .name = "", .parent = -1, .rest_position_m = {}};
+}
+void fig_set_default_joint(fig_joint* value, size_t struct_bytes) {
+  set_default(default_joint(), value, struct_bytes);
+}
+
+static fig_pose default_pose() {
   return {.struct_bytes = sizeof(fig_pose),
           .root_translation_m = {},
           .joint_count = 0,
           .rotations = nullptr};
 }
+void fig_set_default_pose(fig_pose* value, size_t struct_bytes) {
+  set_default(default_pose(), value, struct_bytes);
+}
 
-fig_camera fig_default_camera(void) {
+static fig_camera default_camera() {
   const Camera camera;
   fig_camera out{};
   out.struct_bytes = sizeof out;
@@ -183,8 +195,11 @@ fig_camera fig_default_camera(void) {
   out.near_m = camera.near_m;
   return out;
 }
+void fig_set_default_camera(fig_camera* value, size_t struct_bytes) {
+  set_default(default_camera(), value, struct_bytes);
+}
 
-fig_orbit fig_default_orbit(void) {
+static fig_orbit default_orbit() {
   const OrbitCamera orbit;
   return {.struct_bytes = sizeof(fig_orbit),
           .azimuth_deg = orbit.azimuth_deg,
@@ -193,19 +208,21 @@ fig_orbit fig_default_orbit(void) {
           .vertical_fov_deg = orbit.vertical_fov_deg,
           .target_m = {}};
 }
+void fig_set_default_orbit(fig_orbit* value, size_t struct_bytes) {
+  set_default(default_orbit(), value, struct_bytes);
+}
 
 fig_status fig_package_open(const void* bytes, size_t size_bytes,
                             const fig_package_options* options, fig_package* package) {
   FIG_REPORT_IF_ERROR(check_out(package, "package"));
   *package = {0};
-  const Result<fig_package_options> read =
-      read_options(options, fig_default_package_options(), "package options");
-  if (!read.ok()) return report(read.status());
-  const std::string name = read->name == nullptr ? "package" : read->name;
+  fig_package_options read = fig_default_package_options();
+  FIG_REPORT_IF_ERROR(read_options(options, "package options", read));
+  const std::string name = read.name == nullptr ? "package" : read.name;
   if (bytes == nullptr) return report(invalid(name + ": bytes is NULL"));
   std::span<const std::byte> content(static_cast<const std::byte*>(bytes), size_bytes);
   Buffer<std::byte> copy;
-  if (read->copy != 0) {
+  if (read.copy != 0) {
     if (!copy.ensure(size_bytes)) return report(out_of_memory("a copy of a package"));
     if (size_bytes > 0) std::memcpy(copy.data(), bytes, size_bytes);
     content = {copy.data(), size_bytes};
@@ -287,14 +304,14 @@ fig_status fig_package_find_member(fig_package population, const char* name_or_n
 fig_status fig_make_orbit_camera(const fig_orbit* orbit, uint32_t width_px, uint32_t height_px,
                                  fig_camera* camera) {
   FIG_REPORT_IF_ERROR(check_struct(camera, "camera"));
-  const Result<fig_orbit> read = read_options(orbit, fig_default_orbit(), "orbit");
-  if (!read.ok()) return report(read.status());
+  fig_orbit read = fig_default_orbit();
+  FIG_REPORT_IF_ERROR(read_options(orbit, "orbit", read));
   const Result<Camera> made =
-      make_orbit_camera({.azimuth_deg = read->azimuth_deg,
-                         .elevation_deg = read->elevation_deg,
-                         .distance_m = read->distance_m,
-                         .vertical_fov_deg = read->vertical_fov_deg,
-                         .target_m = {read->target_m[0], read->target_m[1], read->target_m[2]}},
+      make_orbit_camera({.azimuth_deg = read.azimuth_deg,
+                         .elevation_deg = read.elevation_deg,
+                         .distance_m = read.distance_m,
+                         .vertical_fov_deg = read.vertical_fov_deg,
+                         .target_m = {read.target_m[0], read.target_m[1], read.target_m[2]}},
                         width_px, height_px);
   if (!made.ok()) return report(made.status());
   fill_struct(c_camera(*made), camera);

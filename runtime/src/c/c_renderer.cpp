@@ -64,16 +64,15 @@ Result<AvatarId> avatar_of(fig_renderer renderer, fig_avatar avatar) {
 }
 
 Result<std::optional<Precision>> precision_of(const fig_avatar_options* given) {
-  const Result<fig_avatar_options> options =
-      read_options(given, fig_default_avatar_options(), "avatar options");
-  if (!options.ok()) return options.status();
-  if (options->precision > FIG_PRECISION_Q8) {
-    return invalid("precision: " + std::to_string(static_cast<int>(options->precision)) +
+  fig_avatar_options options = fig_default_avatar_options();
+  FIG_RETURN_IF_ERROR(read_options(given, "avatar options", options));
+  if (options.precision > FIG_PRECISION_Q8) {
+    return invalid("precision: " + std::to_string(static_cast<int>(options.precision)) +
                    " is none");
   }
-  if (options->precision == FIG_PRECISION_DEFAULT) return std::optional<Precision>();
-  return std::optional<Precision>(options->precision == FIG_PRECISION_F32 ? Precision::kFloat32
-                                                                          : Precision::kFixedPoint);
+  if (options.precision == FIG_PRECISION_DEFAULT) return std::optional<Precision>();
+  return std::optional<Precision>(options.precision == FIG_PRECISION_F32 ? Precision::kFloat32
+                                                                         : Precision::kFixedPoint);
 }
 
 // An avatar package's content, or a population's member, opened into the object's storage.
@@ -132,43 +131,47 @@ Result<GaussianView> gaussians_of(const fig_gaussians& given) {
 
 // Element i of an array whose elements are structs of one size. Texts only where there is an error.
 template <class T>
-Result<T> read_element(const T* array, size_t i, const T& defaults, const char* what) {
-  const auto where = [&] { return std::string(what) + "[" + std::to_string(i) + "]"; };
+Status read_element(const T* array, size_t i, T& out) {
   const T* const given = i == 0 ? array : element(array, i);
-  Result<T> read = read_struct(given, defaults, "element");
-  if (!read.ok()) return read.status().within(where());
-  if (given->struct_bytes != array->struct_bytes)
-    return invalid(where() + ": struct_bytes differs from the first's");
-  return read;
+  FIG_RETURN_IF_ERROR(read_struct(given, "element", out));
+  return given->struct_bytes == array->struct_bytes
+             ? Status()
+             : invalid("element: struct_bytes differs from the first's");
 }
 
-Status read_avatars(const fig_frame& frame, fig_renderer renderer, RendererObject& object) {
-  object.seen.clear();
-  if (frame.avatar_count > 0) FIG_RETURN_IF_ERROR(check_out(frame.avatars, "avatars"));
-  for (size_t i = 0; i < frame.avatar_count; ++i) {
-    const auto where = [&] { return "avatars[" + std::to_string(i) + "]"; };
-    const Result<fig_frame_avatar> given =
-        read_element(frame.avatars, i, fig_default_frame_avatar(), "avatars");
-    if (!given.ok()) return given.status();
-    const Result<AvatarId> id = avatar_of(renderer, given->avatar);
-    if (!id.ok()) return id.status().within(where());
-    const Result<PoseView> pose = pose_of(given->pose);
-    if (!pose.ok()) return pose.status().within(where());
-    object.seen.push_back({.avatar = *id, .pose = *pose});
-  }
+Status read_avatar(const fig_frame& frame, size_t i, fig_renderer renderer,
+                   RendererObject& object) {
+  fig_frame_avatar given = fig_default_frame_avatar();
+  FIG_RETURN_IF_ERROR(read_element(frame.avatars, i, given));
+  const Result<AvatarId> id = avatar_of(renderer, given.avatar);
+  if (!id.ok()) return id.status();
+  const Result<PoseView> pose = pose_of(given.pose);
+  if (!pose.ok()) return pose.status();
+  object.seen.push_back({.avatar = *id, .pose = *pose});
   return {};
 }
 
-Status read_gaussians(const fig_frame& frame, RendererObject& object) {
-  object.gaussians.clear();
+Status read_gaussians(const fig_frame& frame, size_t i, RendererObject& object) {
+  fig_gaussians given = fig_default_gaussians();
+  FIG_RETURN_IF_ERROR(read_element(frame.gaussians, i, given));
+  const Result<GaussianView> view = gaussians_of(given);
+  if (!view.ok()) return view.status();
+  object.gaussians.push_back(*view);
+  return {};
+}
+
+// Fills the object's arrays.
+Status read_arrays(const fig_frame& frame, fig_renderer renderer, RendererObject& object) {
+  object.seen.clear(), object.gaussians.clear();
+  if (frame.avatar_count > 0) FIG_RETURN_IF_ERROR(check_out(frame.avatars, "avatars"));
   if (frame.gaussians_count > 0) FIG_RETURN_IF_ERROR(check_out(frame.gaussians, "gaussians"));
+  for (size_t i = 0; i < frame.avatar_count; ++i) {
+    const Status read = read_avatar(frame, i, renderer, object);
+    if (!read.ok()) return read.within("avatars[" + std::to_string(i) + "]");
+  }
   for (size_t i = 0; i < frame.gaussians_count; ++i) {
-    const Result<fig_gaussians> given =
-        read_element(frame.gaussians, i, fig_default_gaussians(), "gaussians");
-    if (!given.ok()) return given.status();
-    const Result<GaussianView> view = gaussians_of(*given);
-    if (!view.ok()) return view.status().within("gaussians[" + std::to_string(i) + "]");
-    object.gaussians.push_back(*view);
+    const Status read = read_gaussians(frame, i, object);
+    if (!read.ok()) return read.within("gaussians[" + std::to_string(i) + "]");
   }
   return {};
 }
@@ -185,39 +188,37 @@ Result<LeaveOut> leave_out_of(uint32_t bits) {
 
 // Borrows the object's arrays.
 Result<Frame> frame_of(const fig_frame* given, fig_renderer renderer, RendererObject& object) {
-  const Result<fig_frame> read = read_struct(given, fig_default_frame(), "frame");
-  if (!read.ok()) return read.status();
-  const Result<Camera> camera = camera_of(read->camera);
+  fig_frame read = fig_default_frame();
+  FIG_RETURN_IF_ERROR(read_struct(given, "frame", read));
+  const Result<Camera> camera = camera_of(read.camera);
   if (!camera.ok()) return camera.status();
-  const Result<LeaveOut> leave_out = leave_out_of(read->leave_out);
+  const Result<LeaveOut> leave_out = leave_out_of(read.leave_out);
   if (!leave_out.ok()) return leave_out.status();
-  FIG_RETURN_IF_ERROR(read_avatars(*read, renderer, object));
-  FIG_RETURN_IF_ERROR(read_gaussians(*read, object));
+  FIG_RETURN_IF_ERROR(read_arrays(read, renderer, object));
   Frame frame{.camera = *camera,
               .avatars = object.seen,
               .gaussians = object.gaussians,
               .background = std::nullopt,
-              .splat = {.alpha_cut = read->alpha_cut},
+              .splat = {.alpha_cut = read.alpha_cut},
               .leave_out = *leave_out};
-  if (const float* const rgb = read->background; rgb != nullptr)
+  if (const float* const rgb = read.background; rgb != nullptr)
     frame.background = std::array<float, 3>{rgb[0], rgb[1], rgb[2]};
   return frame;
 }
 
 Result<ImageTarget> target_of(const fig_image* given) {
-  const Result<fig_image> image = read_struct(given, fig_default_image(), "image");
-  if (!image.ok()) return image.status();
-  if (image->format > FIG_PIXEL_NV12)
-    return invalid("image: unknown pixel format " +
-                   std::to_string(static_cast<int>(image->format)));
-  if (image->matrix > FIG_MATRIX_BT601)
-    return invalid("image: unknown matrix " + std::to_string(static_cast<int>(image->matrix)));
-  return ImageTarget{.pixels = image->pixels,
-                     .stride_bytes = image->stride_bytes,
-                     .format = static_cast<PixelFormat>(image->format),
-                     .chroma = image->chroma,
-                     .chroma_stride_bytes = image->chroma_stride_bytes,
-                     .matrix = static_cast<YcbcrMatrix>(image->matrix)};
+  fig_image image = fig_default_image();
+  FIG_RETURN_IF_ERROR(read_struct(given, "image", image));
+  if (image.format > FIG_PIXEL_NV12)
+    return invalid("image: unknown pixel format " + std::to_string(static_cast<int>(image.format)));
+  if (image.matrix > FIG_MATRIX_BT601)
+    return invalid("image: unknown matrix " + std::to_string(static_cast<int>(image.matrix)));
+  return ImageTarget{.pixels = image.pixels,
+                     .stride_bytes = image.stride_bytes,
+                     .format = static_cast<PixelFormat>(image.format),
+                     .chroma = image.chroma,
+                     .chroma_stride_bytes = image.chroma_stride_bytes,
+                     .matrix = static_cast<YcbcrMatrix>(image.matrix)};
 }
 
 Result<Pin<RendererObject>> pin_renderer(fig_renderer renderer) {
@@ -230,7 +231,7 @@ Result<Pin<RendererObject>> pin_renderer(fig_renderer renderer) {
 using namespace figurine;
 using namespace figurine::c;
 
-fig_renderer_options fig_default_renderer_options(void) {
+static fig_renderer_options default_renderer_options() {
   return {.struct_bytes = sizeof(fig_renderer_options),
           .threads = 1,
           .pool = {0},
@@ -238,47 +239,71 @@ fig_renderer_options fig_default_renderer_options(void) {
           .now_ns = nullptr,
           .now_user = nullptr};
 }
-
-fig_avatar_options fig_default_avatar_options(void) {
-  return {.struct_bytes = sizeof(fig_avatar_options), .precision = FIG_PRECISION_DEFAULT};
+void fig_set_default_renderer_options(fig_renderer_options* value, size_t struct_bytes) {
+  set_default(default_renderer_options(), value, struct_bytes);
 }
 
-fig_renderer_info fig_default_renderer_info(void) {
+static fig_avatar_options default_avatar_options() {
+  return {.struct_bytes = sizeof(fig_avatar_options), .precision = FIG_PRECISION_DEFAULT};
+}
+void fig_set_default_avatar_options(fig_avatar_options* value, size_t struct_bytes) {
+  set_default(default_avatar_options(), value, struct_bytes);
+}
+
+static fig_renderer_info default_renderer_info() {
   fig_renderer_info info{};
   info.struct_bytes = sizeof info;
   return info;
 }
+void fig_set_default_renderer_info(fig_renderer_info* value, size_t struct_bytes) {
+  set_default(default_renderer_info(), value, struct_bytes);
+}
 
-fig_image fig_default_image(void) {
+static fig_image default_image() {
   fig_image image{};
   image.struct_bytes = sizeof image;
   return image;
 }
+void fig_set_default_image(fig_image* value, size_t struct_bytes) {
+  set_default(default_image(), value, struct_bytes);
+}
 
-fig_frame_avatar fig_default_frame_avatar(void) {
+static fig_frame_avatar default_frame_avatar() {
   fig_frame_avatar avatar{};
   avatar.struct_bytes = sizeof avatar;
   return avatar;
 }
+void fig_set_default_frame_avatar(fig_frame_avatar* value, size_t struct_bytes) {
+  set_default(default_frame_avatar(), value, struct_bytes);
+}
 
-fig_gaussians fig_default_gaussians(void) {
+static fig_gaussians default_gaussians() {
   fig_gaussians gaussians{};
   gaussians.struct_bytes = sizeof gaussians;
   return gaussians;
 }
+void fig_set_default_gaussians(fig_gaussians* value, size_t struct_bytes) {
+  set_default(default_gaussians(), value, struct_bytes);
+}
 
-fig_frame fig_default_frame(void) {
+static fig_frame default_frame() {
   fig_frame frame{};
   frame.struct_bytes = sizeof frame;
   frame.alpha_cut = kAlphaCut;
   frame.leave_out = FIG_LEAVE_OUT_ALL;
   return frame;
 }
+void fig_set_default_frame(fig_frame* value, size_t struct_bytes) {
+  set_default(default_frame(), value, struct_bytes);
+}
 
-fig_statistics fig_default_statistics(void) {
+static fig_statistics default_statistics() {
   fig_statistics statistics{};
   statistics.struct_bytes = sizeof statistics;
   return statistics;
+}
+void fig_set_default_statistics(fig_statistics* value, size_t struct_bytes) {
+  set_default(default_statistics(), value, struct_bytes);
 }
 
 fig_status fig_threads_create(uint32_t threads, fig_threads* created) {
@@ -302,17 +327,16 @@ fig_status fig_threads_destroy(fig_threads threads) {
 fig_status fig_renderer_create(const fig_renderer_options* options, fig_renderer* renderer) {
   FIG_REPORT_IF_ERROR(check_out(renderer, "renderer"));
   *renderer = {0};
-  const Result<fig_renderer_options> read =
-      read_options(options, fig_default_renderer_options(), "renderer options");
-  if (!read.ok()) return report(read.status());
-  const Result<std::optional<Isa>> isa = isa_of(read->isa);
+  fig_renderer_options read = fig_default_renderer_options();
+  FIG_REPORT_IF_ERROR(read_options(options, "renderer options", read));
+  const Result<std::optional<Isa>> isa = isa_of(read.isa);
   if (!isa.ok()) return report(isa.status());
   std::unique_ptr<RendererObject> object(new (std::nothrow) RendererObject);
   if (object == nullptr) return report(out_of_memory("a renderer"));
   RendererOptions wanted{
-      .threads = read->threads, .now_ns = read->now_ns, .now_user = read->now_user, .isa = *isa};
-  if (read->pool.id != 0) {
-    Result<Pin<ThreadsObject>> pool = handles().pin<ThreadsObject>(read->pool.id);
+      .threads = read.threads, .now_ns = read.now_ns, .now_user = read.now_user, .isa = *isa};
+  if (read.pool.id != 0) {
+    Result<Pin<ThreadsObject>> pool = handles().pin<ThreadsObject>(read.pool.id);
     if (!pool.ok()) return report(pool.status());
     object->threads = std::move(*pool);
     wanted.pool = object->threads->pool;

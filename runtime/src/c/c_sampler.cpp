@@ -46,11 +46,14 @@ Result<size_t> layer_of(const Network& network, uint32_t i) {
 using namespace figurine;
 using namespace figurine::c;
 
-fig_sampler_options fig_default_sampler_options(void) {
+static fig_sampler_options default_sampler_options() {
   return {.struct_bytes = sizeof(fig_sampler_options), .isa = FIG_ISA_BEST};
 }
+void fig_set_default_sampler_options(fig_sampler_options* value, size_t struct_bytes) {
+  set_default(default_sampler_options(), value, struct_bytes);
+}
 
-fig_sample_options fig_default_sample_options(void) {
+static fig_sample_options default_sample_options() {
   return {.struct_bytes = sizeof(fig_sample_options),
           .seed = 0,
           .to = 0,
@@ -58,27 +61,35 @@ fig_sample_options fig_default_sample_options(void) {
           .steps = 0,
           .solver = FIG_SOLVER_DEFAULT};
 }
+void fig_set_default_sample_options(fig_sample_options* value, size_t struct_bytes) {
+  set_default(default_sample_options(), value, struct_bytes);
+}
 
-fig_sampled_info fig_default_sampled_info(void) {
+static fig_sampled_info default_sampled_info() {
   fig_sampled_info info{};
   info.struct_bytes = sizeof info;
   return info;
 }
+void fig_set_default_sampled_info(fig_sampled_info* value, size_t struct_bytes) {
+  set_default(default_sampled_info(), value, struct_bytes);
+}
 
-fig_convolution fig_default_convolution(void) {
+static fig_convolution default_convolution() {
   fig_convolution convolution{};
   convolution.struct_bytes = sizeof convolution;
   return convolution;
+}
+void fig_set_default_convolution(fig_convolution* value, size_t struct_bytes) {
+  set_default(default_convolution(), value, struct_bytes);
 }
 
 fig_status fig_sampler_create(fig_package package, const fig_sampler_options* options,
                               fig_sampler* sampler) {
   FIG_REPORT_IF_ERROR(check_out(sampler, "sampler"));
   *sampler = {0};
-  const Result<fig_sampler_options> read =
-      read_options(options, fig_default_sampler_options(), "sampler options");
-  if (!read.ok()) return report(read.status());
-  const Result<std::optional<Isa>> isa = isa_of(read->isa);
+  fig_sampler_options read = fig_default_sampler_options();
+  FIG_REPORT_IF_ERROR(read_options(options, "sampler options", read));
+  const Result<std::optional<Isa>> isa = isa_of(read.isa);
   if (!isa.ok()) return report(isa.status());
   Result<Pin<PackageObject>> pinned = handles().pin<PackageObject>(package.id);
   if (!pinned.ok()) return report(pinned.status());
@@ -104,10 +115,9 @@ fig_status fig_sampler_sample(fig_sampler sampler, const fig_sample_options* opt
                               fig_sampled* sampled) {
   FIG_REPORT_IF_ERROR(check_out(sampled, "sampled avatar"));
   *sampled = {0};
-  const Result<fig_sample_options> read =
-      read_options(options, fig_default_sample_options(), "sample options");
-  if (!read.ok()) return report(read.status());
-  const Result<SampleRequest> request = request_of(*read);
+  fig_sample_options read = fig_default_sample_options();
+  FIG_REPORT_IF_ERROR(read_options(options, "sample options", read));
+  const Result<SampleRequest> request = request_of(read);
   if (!request.ok()) return report(request.status());
   const Result<Pin<SamplerObject>> pinned =
       handles().pin<SamplerObject>(sampler.id, Use::kExclusive);

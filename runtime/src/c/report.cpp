@@ -22,6 +22,8 @@ static_assert(FIG_INTERRUPTED == static_cast<int>(StatusCode::kInterrupted));
 
 }  // namespace
 
+Status invalid(const std::string& what) { return Status(StatusCode::kInvalidArgument, what); }
+
 fig_status report(const Status& status) {
   if (status.ok()) return FIG_OK;
   const std::string& message = status.message();

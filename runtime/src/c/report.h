@@ -11,9 +11,7 @@ namespace figurine::c {
 // Keeps the message of an error for fig_last_message(). Allocates nothing.
 fig_status report(const Status& status);
 
-inline Status invalid(const std::string& what) {
-  return Status(StatusCode::kInvalidArgument, what);
-}
+Status invalid(const std::string& what);  // kInvalidArgument
 
 }  // namespace figurine::c
 

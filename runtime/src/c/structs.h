@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstring>
-#include <string>
 #include <type_traits>
 
 #include "runtime/src/c/report.h"
@@ -15,36 +14,42 @@ namespace figurine::c {
 template <class T>
 inline constexpr size_t kFirstBytes = sizeof(T);
 
+// kInvalidArgument where the struct is NULL or too small for any version, kUnsupported where it is
+// larger than this one's.
+Status check_size(const size_t* struct_bytes, size_t first_bytes, size_t known_bytes,
+                  const char* what);
+void set_default_bytes(const void* whole, size_t whole_bytes, void* out, size_t struct_bytes);
+
 template <class T>
-Status check_struct(const T* given, const char* what) {
+const size_t* size_of(const T* given) {
   static_assert(std::is_trivially_copyable_v<T> && offsetof(T, struct_bytes) == 0);
-  if (given == nullptr) return invalid(std::string(what) + ": is NULL");
-  if (given->struct_bytes < kFirstBytes<T>) {
-    return invalid(std::string(what) + ": struct_bytes of " + std::to_string(given->struct_bytes) +
-                   ", not what fig_default_...() made it");
-  }
-  if (given->struct_bytes > sizeof(T)) {
-    return Status(StatusCode::kUnsupported,
-                  std::string(what) + ": struct_bytes of " + std::to_string(given->struct_bytes) +
-                      ": of a later version than this library's, or not from fig_default_...()");
-  }
-  return {};
+  return reinterpret_cast<const size_t*>(given);
 }
 
-// What the caller gave, the rest as in defaults.
 template <class T>
-Result<T> read_struct(const T* given, const T& defaults, const char* what) {
-  if (Status sound = check_struct(given, what); !sound.ok()) return sound;
-  T whole = defaults;
-  std::memcpy(&whole, given, given->struct_bytes);
-  return whole;
+Status check_struct(const T* given, const char* what) {
+  return check_size(size_of(given), kFirstBytes<T>, sizeof(T), what);
+}
+
+// The defaults as far as the caller's struct reaches; what a later version added to it is zero, and
+// its size remains for check_struct to refuse.
+template <class T>
+void set_default(const T& whole, T* out, size_t struct_bytes) {
+  set_default_bytes(&whole, sizeof whole, out, struct_bytes);
+}
+
+// Over the defaults in out, what the caller gave.
+template <class T>
+Status read_struct(const T* given, const char* what, T& out) {
+  Status sound = check_struct(given, what);
+  if (sound.ok()) std::memcpy(static_cast<void*>(&out), given, given->struct_bytes);
+  return sound;
 }
 
 // The same where NULL stands for the defaults.
 template <class T>
-Result<T> read_options(const T* given, const T& defaults, const char* what) {
-  if (given == nullptr) return defaults;
-  return read_struct(given, defaults, what);
+Status read_options(const T* given, const char* what, T& out) {
+  return given == nullptr ? Status() : read_struct(given, what, out);
 }
 
 // Fills what the caller has room for; the struct was checked.
@@ -54,9 +59,7 @@ void fill_struct(T whole, T* out) {
   std::memcpy(static_cast<void*>(out), &whole, out->struct_bytes);
 }
 
-inline Status check_out(const void* out, const char* what) {
-  return out == nullptr ? invalid(std::string(what) + ": is NULL") : Status();
-}
+Status check_out(const void* out, const char* what);  // kInvalidArgument "WHAT: is NULL"
 
 // An element of an array whose elements have the first's size.
 template <class T>
