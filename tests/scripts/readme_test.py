@@ -72,7 +72,7 @@ class Readme(unittest.TestCase):
         for link in re.findall(r"\]\(([^)#:]+)\)", text):
             self.assertTrue((ROOT / link).exists(), f"README.md links {link}")
         presets = (ROOT / "CMakePresets.json").read_text(encoding="utf-8")
-        for preset in re.findall(r"--preset (dev|release|asan|tsan|unvectorised)\b", text):
+        for preset in re.findall(r"--preset (dev|release|asan|tsan)\b", text):
             self.assertIn(f'"name": "{preset}"', presets)
 
     def test_tools_take_the_options_they_are_shown_with(self):

@@ -74,13 +74,12 @@ class TestScript(unittest.TestCase):
     def test_runs_every_preset_and_ends_with_ctests_closing_line(self):
         code, output, errors = self.run_script()
         self.assertEqual(code, 0, output + errors)
-        # dev, asan, unvectorised and the first ARM core run both tests, tsan and the second one;
+        # dev, asan and the first ARM core run both tests, tsan and the second one;
         # format, symbols and golden frames come on top.
-        self.assertEqual(closing_line(output), "100% tests passed, 0 tests failed out of 13")
-        for name in ["dev/quick_test", "asan/slow_test", "unvectorised/quick_test",
-                     "tsan/quick_test",
-                     "format", "release/symbols", "golden/host",
-                     "aarch64-cortex-a76/slow_test", "aarch64-cortex-a53/quick_test"]:
+        self.assertEqual(closing_line(output), "100% tests passed, 0 tests failed out of 11")
+        for name in ["dev/quick_test", "asan/slow_test", "tsan/quick_test", "format",
+                     "release/symbols", "golden/host", "aarch64-cortex-a76/slow_test",
+                     "aarch64-cortex-a53/quick_test"]:
             self.assertIn(name, output)
         for name in ["tsan/slow_test", "aarch64-cortex-a53/slow_test"]:
             self.assertNotIn(name, output)
@@ -98,8 +97,7 @@ class TestScript(unittest.TestCase):
         report = self.measured()
         self.assertEqual([row["step"] for row in report["rows"]],
                          ["set-up", "build strict", "build release", "build asan",
-                          "build unvectorised", "build tsan", "build aarch64", "build dev",
-                          "testing"])
+                          "build tsan", "build aarch64", "build dev", "testing"])
         seconds = [row["cpu_seconds"] for row in report["rows"]]
         self.assertEqual(max(seconds), seconds[0], report)
         self.assertTrue(all(value > 0 for value in seconds), report)
@@ -139,21 +137,21 @@ class TestScript(unittest.TestCase):
         self.assertEqual(self.run_script("--quick", "--record")[0], 2)
 
     def test_one_broken_test_of_any_preset_is_a_failure(self):
-        for preset in ["dev", "asan", "unvectorised", "tsan", "aarch64"]:
+        for preset in ["dev", "asan", "tsan", "aarch64"]:
             (self.root / f"break-{preset}").touch()
         code, output, _ = self.run_script()
         self.assertNotEqual(code, 0)
         self.assertEqual(set(re.findall(r"^\t *\d+ - (\S+/\S+) \(Failed\)", output, re.MULTILINE)),
-                         {"dev/quick_test", "asan/quick_test", "unvectorised/quick_test",
-                          "tsan/quick_test", "aarch64-cortex-a76/quick_test",
+                         {"dev/quick_test", "asan/quick_test", "tsan/quick_test",
+                          "aarch64-cortex-a76/quick_test",
                           "aarch64-cortex-a53/quick_test"})
-        self.assertEqual(closing_line(output), "54% tests passed, 6 tests failed out of 13")
+        self.assertEqual(closing_line(output), "55% tests passed, 5 tests failed out of 11")
 
     def test_failing_checks_and_builds_are_failures(self):
         self.script("check_symbols", "exit 1")
         code, output, _ = self.run_script()
         self.assertNotEqual(code, 0)
-        self.assertIn("1 tests failed out of 13", output)
+        self.assertIn("1 tests failed out of 11", output)
         self.write_project(PROJECT + 'add_custom_target(broken ALL COMMAND false)\n')
         code, output, errors = self.run_script()
         self.assertNotEqual(code, 0)
