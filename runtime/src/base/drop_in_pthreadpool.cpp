@@ -71,6 +71,10 @@ class DenormalsOff {
   Register before_ = 0;
 };
 
+// More batches than threads, so that a thread that comes late or is taken away leaves little
+// undone.
+constexpr size_t kBatchesPerThread = 8;
+
 // A grid of D dimensions, the last K of them in tiles. call(thread, place in every dimension...,
 // extent in every tiled one...) once for each item or tile.
 template <size_t D, size_t K, class Call>
@@ -79,29 +83,38 @@ struct Grid {
   std::array<size_t, K> tile;
   bool denormals_off;
   const Call& call;
+  std::array<size_t, D> steps;  // items or tiles in every dimension
+  size_t count;                 // of all
+  size_t batch;                 // that a thread takes at once
 
-  size_t steps(size_t d) const {
-    if constexpr (K > 0) {
-      if (d >= D - K) return (range[d] + tile[d - (D - K)] - 1) / tile[d - (D - K)];
+  Grid(const std::array<size_t, D>& ranges, const std::array<size_t, K>& tiles, bool flush,
+       size_t threads, const Call& called)
+      : range(ranges), tile(tiles), denormals_off(flush), call(called), steps(ranges), count(1) {
+    for (size_t k = 0; k < K; ++k) {
+      const size_t d = D - K + k;
+      steps[d] = (range[d] + tile[k] - 1) / tile[k];
     }
-    return range[d];
+    for (const size_t step : steps) count *= step;
+    batch = threads == 1 ? count : std::max<size_t>(1, count / (kBatchesPerThread * threads));
   }
-  size_t count() const {
-    size_t product = 1;
-    for (size_t d = 0; d < D; ++d) product *= steps(d);
-    return product;
+
+  // Items [begin, end) in their order. Only the first one's place takes divisions.
+  void visit(size_t begin, size_t end, size_t thread) const {
+    std::array<size_t, D> step{};
+    size_t rest = begin;
+    for (size_t d = D; d-- > 0; rest /= steps[d]) step[d] = rest % steps[d];
+    for (size_t item = begin; item < end; ++item) {
+      visit(step, thread);
+      for (size_t d = D; d-- > 0 && ++step[d] == steps[d];) step[d] = 0;
+    }
   }
-  void visit(size_t item, size_t thread) const {
-    std::array<size_t, D> place;
+  void visit(const std::array<size_t, D>& step, size_t thread) const {
+    std::array<size_t, D> place = step;
     std::array<size_t, K> extent;
-    for (size_t d = D; d-- > 0; item /= steps(d)) {
-      place[d] = item % steps(d);
-      if constexpr (K > 0) {
-        if (d < D - K) continue;
-        const size_t k = d - (D - K);
-        place[d] *= tile[k];
-        extent[k] = std::min(range[d] - place[d], tile[k]);
-      }
+    for (size_t k = 0; k < K; ++k) {
+      const size_t d = D - K + k;
+      place[d] *= tile[k];
+      extent[k] = std::min(range[d] - place[d], tile[k]);
     }
     [&]<size_t... P, size_t... E>(std::index_sequence<P...>, std::index_sequence<E...>) {
       call(thread, place[P]..., extent[E]...);
@@ -110,18 +123,19 @@ struct Grid {
   static void share(void* context, WorkerPool::Loop& loop, uint32_t thread) {
     const Grid& grid = *static_cast<const Grid*>(context);
     const DenormalsOff denormals_off(grid.denormals_off);
-    for (size_t i; loop.next(i);) grid.visit(i, thread);
+    for (size_t begin, end; loop.next(grid.batch, begin, end);) grid.visit(begin, end, thread);
   }
 };
 
 template <size_t D, size_t K, class Call>
 void loop(pthreadpool* pool, const std::array<size_t, D>& range, const std::array<size_t, K>& tile,
           uint32_t flags, const Call& call) {
-  Grid<D, K, Call> grid{range, tile, (flags & PTHREADPOOL_FLAG_DISABLE_DENORMALS) != 0, call};
+  Grid<D, K, Call> grid(range, tile, (flags & PTHREADPOOL_FLAG_DISABLE_DENORMALS) != 0,
+                        pool != nullptr ? pool->workers->threads() : 1, call);
   if (pool != nullptr) {
-    pool->workers->run(grid.count(), grid.share, &grid);
+    pool->workers->run(grid.count, grid.share, &grid);
   } else {
-    WorkerPool::run_alone(grid.count(), grid.share, &grid);
+    WorkerPool::run_alone(grid.count, grid.share, &grid);
   }
 }
 

@@ -50,6 +50,14 @@ class WorkerPool::Loop {
     i = next_.fetch_add(1, std::memory_order_relaxed);
     return i < count_;
   }
+  // The same for up to `most` indices that follow each other, [begin, end): one look at what the
+  // threads share for all of them.
+  bool next(size_t most, size_t& begin, size_t& end) {
+    begin = next_.fetch_add(most, std::memory_order_relaxed);
+    if (begin >= count_) return false;
+    end = most < count_ - begin ? begin + most : count_;
+    return true;
+  }
 
  private:
   friend class WorkerPool;
