@@ -144,7 +144,7 @@ void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads,
   gaussians.resize(count, frame.decoding.sh_degree);
   parallel_for(threads, (count + kChunk - 1) / kChunk, [&](uint32_t chunk) {
     for (uint32_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
-      const Scalar* h = head + size_t(frame.body->texel[i]) * channels;
+      const Scalar* h = head + size_t(i) * channels;
       Decoded<Scalar> decoded;
       decode_texel(frame, i, h, decoded);
       Scalar canonical[3];
@@ -174,8 +174,7 @@ void decode_head_backward(const HeadFrame& frame, const Scalar* head,
                  channels = head_channels(frame.decoding.sh_degree), sh_values = channels - 11;
   FIG_CHECK(gradients.count == count && gradients.sh_degree == frame.decoding.sh_degree,
             "gradients of these Gaussians");
-  const uint32_t size = frame.body->uv_size;
-  std::fill_n(head_gradient, size_t(size) * size * channels, Scalar(0));
+  std::fill_n(head_gradient, size_t(count) * channels, Scalar(0));
   parallel_for(threads, (count + kChunk - 1) / kChunk, [&](uint32_t chunk) {
     for (uint32_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
       const Scalar* const dp = &gradients.position_m[3 * size_t(i)];
@@ -187,8 +186,8 @@ void decode_head_backward(const HeadFrame& frame, const Scalar* head,
         return std::all_of(values, values + n, [](Scalar v) { return v == 0; });
       };
       if (zero(dp, 3) && zero(df, 9) && gradients.opacity[i] == 0 && zero(dsh, sh_values)) continue;
-      const Scalar* h = head + size_t(frame.body->texel[i]) * channels;
-      Scalar* const dh = head_gradient + size_t(frame.body->texel[i]) * channels;
+      const Scalar* h = head + size_t(i) * channels;
+      Scalar* const dh = head_gradient + size_t(i) * channels;
       Decoded<Scalar> at;
       decode_texel(frame, i, h, at);
       const Scalar* m = at.blended;

@@ -1,9 +1,8 @@
-// The Gaussian head: raw network outputs per texel to world-space Gaussians, and the analytic
-// gradient back (HeadDecoding in figurine/avatar.h).
+// The Gaussian head: a row of raw outputs per covered texel (compose.h) to a world-space Gaussian,
+// and the analytic gradient back (HeadDecoding in figurine/avatar.h).
 //
-// Only covered texels become Gaussians; all other outputs have gradient zero. Instantiated for
-// float (training) and double (finite-difference checks). In float it does the same operations in
-// the same order as the runtime's decoding.
+// Instantiated for float (training) and double (finite-difference checks). In float it does the
+// same operations in the same order as the runtime's decoding.
 #pragma once
 
 #include <cstdint>
@@ -43,12 +42,12 @@ struct GaussianBuffer {
   }
 };
 
-// head: [T,T,head_channels(sh_degree)] raw outputs.
+// head: [N,head_channels(sh_degree)] raw outputs.
 template <class Scalar>
 void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads,
                  GaussianBuffer<Scalar>& gaussians);
 
-// gradients: dL/dGaussians of decode_head's result. head_gradient: [T,T,channels], all of it is
+// gradients: dL/dGaussians of decode_head's result. head_gradient: [N,channels], all of it is
 // written.
 template <class Scalar>
 void decode_head_backward(const HeadFrame& frame, const Scalar* head,

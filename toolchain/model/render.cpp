@@ -60,11 +60,12 @@ AvatarRenderer::~AvatarRenderer() = default;
 
 torch::Tensor AvatarRenderer::render(const torch::Tensor& head, const HeadFrame& frame,
                                      const RenderView& view) {
-  const int64_t size = frame.body->uv_size, channels = head_channels(frame.decoding.sh_degree);
+  const int64_t texels = frame.body->texel_count(),
+                channels = head_channels(frame.decoding.sh_degree);
   TORCH_CHECK(head.scalar_type() == torch::kFloat && head.is_contiguous(),
               "AvatarRenderer: the head must be contiguous floats");
-  TORCH_CHECK(head.sizes() == torch::IntArrayRef({size, size, channels}),
-              "AvatarRenderer: the head must be [T,T,", channels, "] with T = ", size);
+  TORCH_CHECK(head.sizes() == torch::IntArrayRef({texels, channels}),
+              "AvatarRenderer: the head must be [", texels, ",", channels, "]");
   state_->frame = frame;
   return Render::apply(head, state_, view);
 }

@@ -1,5 +1,5 @@
-// The differentiable picture: head outputs to the RGBA crop of one camera, as one torch operation
-// (decode, skin, splat; analytic backward).
+// The differentiable picture: a head row per texel to the RGBA crop of one camera, as one torch
+// operation (decode, skin, splat; analytic backward).
 #pragma once
 
 #include "toolchain/model/head.h"
@@ -22,7 +22,7 @@ class AvatarRenderer {
   explicit AvatarRenderer(const SplatterOptions& options);
   ~AvatarRenderer();
 
-  // head: [T,T,C] float, contiguous (PoseUNet::forward's result). Returns [4, crop.height,
+  // head: [N,C] float, contiguous (HeadComposer::forward's result). Returns [4, crop.height,
   // crop.width] float: premultiplied R, G, B and alpha. What `frame` borrows must live until the
   // backward pass is done.
   torch::Tensor render(const torch::Tensor& head, const HeadFrame& frame, const RenderView& view);

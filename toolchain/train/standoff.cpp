@@ -151,7 +151,7 @@ void add_offset_gradient(const model::HeadFrame& frame, std::span<const double> 
         blend(frame.world_from_rest, &body.texel_joints[size_t(i) * kSkinInfluences],
               &body.texel_weights[size_t(i) * kSkinInfluences])
             .m;
-    float* const dh = head_gradient + size_t(body.texel[i]) * channels;
+    float* const dh = head_gradient + size_t(i) * channels;
     for (int k = 0; k < 3; ++k)
       dh[k] +=
           float(frame.decoding.offset_scale_m * (m[k] * d[0] + m[4 + k] * d[1] + m[8 + k] * d[2]));

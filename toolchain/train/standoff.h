@@ -46,7 +46,7 @@ struct StandoffView {
 double standoff_loss(const StandoffView& view, std::span<const float> position_m,
                      const StandoffOptions& options, double scale, std::span<double> gradient);
 
-// Adds dL/dh = offset_scale A^T dL/dcentre to the offsets of a head's gradient, [T,T,channels].
+// Adds dL/dh = offset_scale A^T dL/dcentre to the offsets of a head's gradient, [N,channels].
 // Texels of gradient zero are not touched.
 void add_offset_gradient(const model::HeadFrame& frame, std::span<const double> position_gradient,
                          float* head_gradient);

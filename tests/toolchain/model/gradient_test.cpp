@@ -126,10 +126,8 @@ TEST(HeadGradients, HostileOutputsGiveFiniteGradients) {
                                .world_from_rest = transforms,
                                .decoding = {.sh_degree = 1}};
   constexpr uint32_t kChannels = head_channels(1);
-  std::vector<float> head(size_t(16) * 16 * kChannels, 0.1f);
-  const auto at = [&](uint32_t texel) {
-    return &head[size_t(capsule.body.texel[texel]) * kChannels];
-  };
+  std::vector<float> head(size_t(capsule.body.texel_count()) * kChannels, 0.1f);
+  const auto at = [&](uint32_t texel) { return &head[size_t(texel) * kChannels]; };
   at(100)[10] = 1e4f;
   at(101)[10] = -1e4f;
   at(102)[3] = 1e4f;  // scale beyond the clamp
@@ -168,12 +166,12 @@ TEST(HeadDecoding, EqualsTheSharedArithmetic) {
                                .decoding = {}};
   std::mt19937 random(5);
   std::normal_distribution<float> normal;
-  std::vector<float> head(size_t(16) * 16 * 14);
+  std::vector<float> head(size_t(capsule.body.texel_count()) * 14);
   for (float& value : head) value = normal(random);
   model::GaussianBuffer<float> gaussians;
   decode_head(frame, head.data(), 2, gaussians);
   for (uint32_t i = 0; i < capsule.body.texel_count(); ++i) {
-    const float* h = &head[size_t(capsule.body.texel[i]) * 14];
+    const float* h = &head[size_t(i) * 14];
     const Affine m = blend(transforms, &capsule.texel_joints[i * kSkinInfluences],
                            &capsule.weights[i * kSkinInfluences]);
     float canonical[3], quaternion[4];

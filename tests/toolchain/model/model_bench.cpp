@@ -1,5 +1,6 @@
-// figurine_model_bench: milliseconds of every part of a training iteration at the `edge` setting
-// (medians of interleaved rounds). Not a test.
+// figurine_model_bench [THREADS [ROUNDS [bf16|f32 [T_n]]]]: milliseconds of every part of a
+// training iteration at T = 128 with static values, network at T_n (128) (medians of interleaved
+// rounds). Not a test.
 #include <time.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 
 #include "tests/toolchain/model/synthetic_body.h"
 #include "toolchain/model/allocator.h"
+#include "toolchain/model/compose.h"
 #include "toolchain/model/head.h"
 #include "toolchain/model/loss.h"
 #include "toolchain/model/optimiser.h"
@@ -53,6 +55,7 @@ struct Row {
 int main(int argc, char** argv) {
   const uint32_t threads = argc > 1 ? static_cast<uint32_t>(std::atoi(argv[1])) : 2;
   const int rounds = argc > 2 ? std::atoi(argv[2]) : 30;
+  const uint32_t size = argc > 4 ? static_cast<uint32_t>(std::atoi(argv[4])) : 128;
   keep_freed_memory();
   const testing::SyntheticBody capsule(128, 77);
   const std::vector<Affine> transforms = capsule.bent();
@@ -68,7 +71,12 @@ int main(int argc, char** argv) {
                         .decoding = {}};
   std::mt19937 random(1);
   std::normal_distribution<float> normal;
-  std::vector<float> head(128 * 128 * 14), head_gradient(head.size());
+  const HeadLayout layout{
+      .network_size = size, .channels = head_channels(0), .statics = {{0, 14, 128}}};
+  const HeadComposer composer(capsule.body, layout);
+  std::vector<float> head(size_t(composer.texel_count()) * 14), head_gradient(head.size()),
+      statics(composer.static_count()), static_gradient(statics.size()),
+      network(size_t(size) * size * 14, 0.1f), network_gradient(network.size());
   for (float& value : head) value = 0.3f * normal(random);
   const PixelRect crop{0, 0, 512, 512};
   std::vector<float> image(4 * 512 * 512), image_gradient(image.size());
@@ -79,12 +87,12 @@ int main(int argc, char** argv) {
   torch::set_num_threads(static_cast<int>(threads));
   const bool bf16 = argc <= 3 || std::string(argv[3]) == "bf16";
   PoseUNet unet(
-      make_pose_unet(128, 26, 32, head_channels(0)),
+      make_pose_unet(size, 26, 32, head_channels(0)),
       {.precision = bf16 ? model::Precision::kBfloat16 : model::Precision::kFloat32, .seed = 1});
   Optimiser adamw(adamw_group(unet.parameter_count()), {}), muon(unet.muon_groups(), {});
   AvatarRenderer renderer({.threads = threads});
-  const torch::Tensor input = torch::randn({128, 128, 26}),
-                      head_weights = torch::randn({128, 128, 14});
+  const torch::Tensor input = torch::randn({size, size, 26}),
+                      head_weights = torch::randn({size, size, 14});
   torch::Tensor unet_head;
   SsimScratch<float> scratch;
   std::vector<float> ssim_gradient(3 * 512 * 512), other(3 * 512 * 512, 0.4f);
@@ -93,11 +101,32 @@ int main(int argc, char** argv) {
   const LossOptions loss_options{.threads = threads};
   const auto iterate = [&] {
     unet.zero_gradients();
-    const torch::Tensor picture = renderer.render(unet.forward(input), frame, {camera, crop});
+    const torch::Tensor output = unet.forward(input);
+    torch::Tensor rows = torch::empty({composer.texel_count(), 14});
+    composer.forward(output.const_data_ptr<float>(), statics.data(), threads,
+                     rows.mutable_data_ptr<float>());
+    rows.requires_grad_();
+    const torch::Tensor picture = renderer.render(rows, frame, {camera, crop});
     image_loss(picture, target, {0.5f, 0.5f, 0.5f}, loss_options, &terms).backward();
+    torch::Tensor gradient = torch::empty_like(output);
+    composer.backward(output.const_data_ptr<float>(), statics.data(),
+                      rows.grad().const_data_ptr<float>(), threads,
+                      gradient.mutable_data_ptr<float>(), static_gradient.data());
+    output.backward(gradient);
     adamw.step(unet.weights(), unet.gradients(), 1e-4);
   };
   std::vector<Row> rows{
+      {"compose",
+       [&] { composer.forward(network.data(), statics.data(), threads, head.data()); },
+       {},
+       {}},
+      {"compose backward",
+       [&] {
+         composer.backward(network.data(), statics.data(), head_gradient.data(), threads,
+                           network_gradient.data(), static_gradient.data());
+       },
+       {},
+       {}},
       {"decode", [&] { decode_head(frame, head.data(), threads, gaussians); }, {}, {}},
       {"splat forward",
        [&] { splatter.forward(gaussians.view(), camera, crop, image.data()); },
