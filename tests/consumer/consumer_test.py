@@ -72,10 +72,11 @@ class Consumer(unittest.TestCase):
         """The program's frame, which is no empty one. pools: whose functions XNNPACK is to find."""
         return self.drawn(program, *PACKAGES, SIZE, SIZE, pools=pools)
 
-    def drawn(self, *command, pools=None):
+    def drawn(self, *command, pools=None, preload=""):
         error = []
         rgba = run(*command, error=error, environment={
-            "LD_LIBRARY_PATH": str(self.library), "LD_DEBUG": "bindings" if pools else ""})
+            "LD_LIBRARY_PATH": str(self.library), "LD_PRELOAD": preload,
+            "LD_DEBUG": "bindings" if pools else ""})
         if pools:
             self.assertEqual(pools_of_xnnpack(error[0]), {pools})
         self.assertEqual(len(rgba), 4 * SIZE * SIZE)
@@ -115,14 +116,18 @@ class Consumer(unittest.TestCase):
         xnnpack = re.search(r"=> (\S+/libXNNPACK\S+)", run(
             "ldd", self.library / "libfigurine.so").decode()).group(1)
 
-        def draw(threads, *before, pools):
+        def draw(threads, *before, pools, preload=""):
             return self.drawn(sys.executable, "-c", LOADER, plugin, threads, *PACKAGES, SIZE,
-                              *before, pools=pools)
+                              *before, pools=pools, preload=preload)
         alone = draw(1, pools=OURS)
         threads = min(2, len(os.sched_getaffinity(0)))
         self.assertEqual(draw(threads, pools=OURS), alone)
-        # Loaded before, XNNPACK keeps what it found: it is given none of our pools then.
+        # Loaded before, XNNPACK keeps what it found: it is given none of our pools then. A program
+        # that brings the system's pool is likewise, unless it brings ours ahead of it.
         self.assertEqual(draw(threads, xnnpack, pools=SYSTEMS), alone)
+        system = f"{SYSTEMS}.so.0"
+        self.assertEqual(draw(threads, pools=SYSTEMS, preload=system), alone)
+        self.assertEqual(draw(threads, pools=OURS, preload=f"{OURS}.so.0:{system}"), alone)
 
     def test_the_pool_is_as_whole_as_the_systems(self):
         def functions(library):
