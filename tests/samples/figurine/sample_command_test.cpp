@@ -11,7 +11,7 @@
 
 #include "formats/writer/sampler_writer.h"
 #include "ports/host/files.h"
-#include "runtime/random_sampler.h"
+#include "runtime/sample/random_sampler.h"
 #include "samples/program.h"
 
 namespace figurine {

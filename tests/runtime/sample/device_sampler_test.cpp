@@ -13,7 +13,7 @@
 #include "figurine/avatar_sampler.h"
 #include "figurine/package.h"
 #include "formats/package_samples.h"
-#include "runtime/random_sampler.h"
+#include "runtime/sample/random_sampler.h"
 #include "runtime/src/sample/device_transformer.h"
 #include "runtime/src/sample/integer_linear.h"
 #include "runtime/src/sample/weight_decoder.h"
