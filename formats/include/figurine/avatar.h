@@ -44,6 +44,35 @@ struct PoseStatistics {
   std::span<const float> covariance;  // [3P,3P] symmetric, regularised to be positive definite
 };
 
+// Which channels of the head a static part may hold: offset, log-scale, quaternion, opacity, and
+// the three colours of SH degree 0.
+inline constexpr uint32_t kStaticChannels = 14;
+inline constexpr uint32_t kStaticColour = 11;  // the first of the colours
+
+// Head channels with one grid, rounded to 8 bits: value = scale[c] * q.
+struct StaticGroup {
+  uint32_t first_channel = 0, channels = 0;
+  uint32_t grid_size = 0;          // cells a side (figurine/texel_grid.h)
+  std::span<const int8_t> values;  // [M,channels], -127 to 127
+  std::span<const float> scale;    // [channels] > 0, normal
+};
+
+// What every texel's Gaussian has whatever the pose: the spatially varying bias of the head. Groups
+// share no channel; channels in none are 0. With s the value at a texel (bilinear in the group's
+// grid) and h the network's output there (bilinear in the network's grid; 0 without a network)
+//
+//   offset, log-scale, quaternion, opacity:  h' = h + s
+//   SH degree 0 of a colour:                 h' = (h + kHalfColour) e^s - kHalfColour
+//   SH above degree 0 of that colour:        h' = h e^s
+//
+// so that a colour is the network's times e^s, and 0 changes nothing.
+struct StaticPart {
+  std::vector<StaticGroup> groups;
+  bool empty() const { return groups.empty(); }
+};
+// In units of SH degree 0's coefficient: the half that splatting adds to a colour.
+inline constexpr float kHalfColour = 1.7724538509f;  // 0.5 / 0.28209479 = sqrt(pi)
+
 // In which arithmetic a network is evaluated.
 enum class Precision : uint8_t { kFloat32, kFixedPoint };
 const char* to_string(Precision precision);  // "f32", "q8"
@@ -98,11 +127,14 @@ struct AvatarTraits {
   const AvatarTraits& traits() const { return *this; }
 };
 
-// The network's float weights may be absent if fixed_point is there.
+// The network's float weights may be absent if fixed_point is there. The network may run on a grid
+// coarser than the body's texels (network.input_size; figurine/texel_grid.h), and there may be none
+// (no layers): then there is a static part.
 struct Avatar : AvatarKind, AvatarTraits {
   std::string name;
   std::span<const float> shape;   // [<= S]
   FixedPointNetwork fixed_point;  // empty if the package has none
+  StaticPart static_part;         // empty if the package has none
   PoseStatistics pose_statistics;
 
   // A package holds one or both.
