@@ -29,11 +29,12 @@ struct AvatarArguments {
   std::string data, body, run;
   bool all = false, resume = false, quiet = false;
   std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser,
-      standoff;
+      standoff, network, static_grids, static_colour;
   std::optional<uint64_t> seed, iterations;
-  std::optional<double> minutes, learning_rate, weight_decay;
+  std::optional<double> minutes, learning_rate, weight_decay, static_learning_rate, static_penalty,
+      clip_gradient;
   std::optional<float> spacing_scale;
-  std::optional<uint32_t> warmup, views, poses;
+  std::optional<uint32_t> warmup, views, poses, uv, network_size, channels;
   bool freeze_pose = false;
   uint32_t threads = 0;  // 0: all cores, with --all one
   uint32_t slots = 0;    // 0: as many as the threads leave cores for
@@ -45,6 +46,24 @@ Enum choose(const std::string& text, std::initializer_list<Enum> values) {
     if (text == train::to_string(value)) return value;
   }
   throw InputError("\"" + text + "\" is unknown");  // CLI11 has checked the words already
+}
+
+// Network and static values.
+void overlay_parts(const AvatarArguments& arguments, train::TrainSettings& settings) {
+  using model::StaticColour;
+  if (arguments.uv) settings.uv_size = *arguments.uv;
+  if (arguments.network) settings.network = *arguments.network != "none";
+  if (arguments.network_size) settings.network_size = *arguments.network_size;
+  if (arguments.channels) settings.channels = *arguments.channels;
+  if (arguments.static_grids)
+    settings.static_grids = train::parse_static_grids(*arguments.static_grids, "--static-grids");
+  if (arguments.static_colour)
+    settings.static_colour =
+        choose(*arguments.static_colour, {StaticColour::kGain, StaticColour::kSum});
+  if (arguments.static_learning_rate)
+    settings.static_learning_rate = *arguments.static_learning_rate;
+  if (arguments.static_penalty) settings.static_penalty = *arguments.static_penalty;
+  if (arguments.clip_gradient) settings.clip_gradient = *arguments.clip_gradient;
 }
 
 void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
@@ -59,6 +78,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
                                    ? kDefaultOctaves
                                    : uint32_t(std::stoul(*arguments.fourier));
   }
+  overlay_parts(arguments, settings);
   if (arguments.seed) settings.seed = *arguments.seed;
   if (arguments.init) settings.init = *arguments.init;
   if (arguments.learning_rate) settings.schedule.peak = *arguments.learning_rate;
@@ -131,8 +151,11 @@ train::TrainRequest make_request(const AvatarArguments& arguments, const std::st
     overlay(arguments, request.settings);
     const nlohmann::json asked = train::to_json(request.settings),
                          was = train::to_json(old.settings);
-    for (const auto& [key, value] : was.items()) {
-      if (asked.at(key) != value)
+    // What has its default may be left out of either.
+    nlohmann::json all = asked;
+    all.update(was);
+    for (const auto& [key, value] : all.items()) {
+      if (asked.value(key, nlohmann::json()) != was.value(key, nlohmann::json()))
         throw InputError(run + ": --resume goes on with the run's own settings; " + key +
                          " differs from run.json");
     }
@@ -170,6 +193,44 @@ void train_one(const AvatarArguments& arguments) {
 }
 
 }  // namespace
+
+void add_part_options(CLI::App* command, AvatarArguments& arguments) {
+  command->add_option("--uv", arguments.uv, "Texels a side, as the body's (default: the preset's)")
+      ->check(CLI::Range(8, 1024));
+  command
+      ->add_option("--network", arguments.network,
+                   "none: static values alone, whatever the pose (default unet)")
+      ->check(CLI::IsMember({"unet", "none"}));
+  command
+      ->add_option("--network-size", arguments.network_size,
+                   "Texels a side that the network sees: 1, 1/2, 1/4 or 1/8 of the body's (default "
+                   "all)")
+      ->check(CLI::Range(8, 1024));
+  command->add_option("--channels", arguments.channels, "Of the network (default: the preset's)")
+      ->check(CLI::Range(1, 2048));
+  command->add_option("--static-grids", arguments.static_grids,
+                      "What every texel owns whatever the pose, by groups of channels and their "
+                      "resolution: colour:T,rest:T/2 (all, colour, rest, geometry, offset, scale, "
+                      "rotation, opacity; T, T/2, T/4, T/8), or none (default)");
+  command
+      ->add_option("--static-colour", arguments.static_colour,
+                   "Static colours times the network's (gain, default) or added to them (sum: an "
+                   "experiment, cannot be packed)")
+      ->check(CLI::IsMember({"gain", "sum"}));
+  command
+      ->add_option("--static-learning-rate", arguments.static_learning_rate,
+                   "Of the static values, peak of the same schedule (default 1.5e-2)")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--static-penalty", arguments.static_penalty,
+                   "Weight of the static values' mean square in the loss (default 0)")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--clip-gradient", arguments.clip_gradient,
+                   "Largest norm of an iteration's gradients; run.json says the last (default 0: "
+                   "none)")
+      ->check(CLI::NonNegativeNumber);
+}
 
 void add_avatar_command(CLI::App& app) {
   auto arguments = std::make_shared<AvatarArguments>();
@@ -257,6 +318,7 @@ void add_avatar_command(CLI::App& app) {
           "--slots", arguments->slots,
           "With --all: trainings at a time, each in its own process (default: cores / threads)")
       ->check(CLI::Range(1, 256));
+  add_part_options(command, *arguments);
   command->callback([arguments] {
     if (arguments->all) {
       if (arguments->data.empty()) throw InputError("--all needs --data");

@@ -63,6 +63,19 @@ void print_group(const char* title, const nlohmann::json& group) {
               number("head_psnr_db"), number("highpass_ratio"), group.at("images").get<int>());
 }
 
+void print_parts(const nlohmann::json& parts) {
+  if (const nlohmann::json& network = parts.at("network"); !network.is_null()) {
+    std::printf("network at %ux%u, %u channels: %u weights (%u bytes in q8)\n",
+                network.at("size").get<unsigned>(), network.at("size").get<unsigned>(),
+                network.at("channels").get<unsigned>(), network.at("parameters").get<unsigned>(),
+                network.at("bytes_q8").get<unsigned>());
+  }
+  if (const nlohmann::json& statics = parts.at("static"); !statics.is_null()) {
+    std::printf("static %s: %u values (%u bytes)\n", statics.at("grids").get<std::string>().c_str(),
+                statics.at("values").get<unsigned>(), statics.at("bytes").get<unsigned>());
+  }
+}
+
 void run_reconstruction(const EvaluateArguments& arguments) {
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
   nlohmann::json report = report_head(arguments, avatar);
@@ -76,6 +89,7 @@ void run_reconstruction(const EvaluateArguments& arguments) {
   }
   train::write_json(train::RunDirectory{arguments.open.run}.evaluation(), report);
   if (!arguments.output.empty()) train::write_json(arguments.output, report);
+  print_parts(report.at("parts"));
   print_group("held-out views", report.at("held_out_views"));
   print_group("held-out poses", report.at("held_out_poses"));
   print_group("  interleaved", report.at("held_out_poses_interleaved"));

@@ -31,6 +31,21 @@ bool all_finite(const float* values, int64_t count) {
 
 }  // namespace
 
+double squared_norm(const torch::Tensor& gradients) {
+  const float* values = gradients.const_data_ptr<float>();
+  const int64_t count = gradients.numel();
+  double sums[8] = {};  // squares of floats do not overflow double
+  int64_t i = 0;
+  for (; i + 8 <= count; i += 8) {
+    for (int lane = 0; lane < 8; ++lane)
+      sums[lane] += double(values[i + lane]) * double(values[i + lane]);
+  }
+  for (; i < count; ++i) sums[0] += double(values[i]) * double(values[i]);
+  double sum = 0;
+  for (const double part : sums) sum += part;
+  return sum;
+}
+
 std::vector<ParameterGroup> adamw_group(uint64_t parameters) {
   return {{0, static_cast<int64_t>(parameters), 0}};
 }

@@ -52,6 +52,9 @@ class Optimiser {
   OptimiserOptions options_;
 };
 
+// Of all values together, in double. Not finite exactly where one of [P] contiguous floats is not.
+double squared_norm(const torch::Tensor& gradients);
+
 // One group for all of `parameters`: AdamW.
 std::vector<ParameterGroup> adamw_group(uint64_t parameters);
 

@@ -42,6 +42,8 @@ train::TrainSettings fine_tune_settings(const train::TrainSettings& of_run,
                        .floor_fraction = 0,
                        .budget = {.iterations = options.iterations, .seconds = 0}};
   settings.warmup_iterations = 0;
+  settings.static_learning_rate =
+      0;                         // the run's own, rounded: a package has one for both precisions
   settings.standoff_weight = 0;  // what stands off has been found
   settings.bf16 = false;
   settings.threads = options.threads;

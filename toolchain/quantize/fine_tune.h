@@ -1,5 +1,5 @@
 // Quantisation-aware training: a short fine-tune of a finished run with fake quantisation on, in
-// the trainer's own loop with its own loss.
+// the trainer's own loop with its own loss. Static values are rounded as in a package and stay.
 #pragma once
 
 #include <string>

@@ -49,6 +49,7 @@ constexpr size_t kWorstPoses = 5;
 struct Variant {
   torch::Tensor weights;                                    // [P]
   std::shared_ptr<const model::FakeQuantisation> rounding;  // null: float
+  bool round_statics = false;                               // as a package holds them
 };
 
 struct View {
@@ -95,6 +96,7 @@ class Laboratory {
 
   train::TrainedAvatar& avatar_;
   Variant plain_;
+  torch::Tensor statics_, rounded_statics_;
   std::vector<LookedAtPose> poses_;
   std::vector<PoseSequence> sequences_;
   std::vector<FloatPictures> plain_sequences_;
@@ -103,6 +105,12 @@ class Laboratory {
 Laboratory::Laboratory(train::TrainedAvatar& avatar, const QuantizationOptions& options)
     : avatar_(avatar) {
   plain_.weights = model().unet().weights().detach().clone();
+  train::StaticMap& statics = model().statics();
+  statics_ = statics.values.clone();
+  const model::HeadLayout layout = train::head_layout(model().settings());
+  train::take_static_part(train::RoundedMap(statics, layout).view(), layout, statics);
+  rounded_statics_ = statics.values.clone();
+  statics.values.copy_(statics_);
   choose_pictures(options);
   choose_sequences(options);
   for (const PoseSequence& sequence : sequences_)
@@ -179,6 +187,7 @@ void Laboratory::use(const Variant& variant) {
   torch::NoGradGuard no_gradient;
   model().unet().weights().copy_(variant.weights);
   model().unet().set_fake_quantisation(variant.rounding);
+  model().statics().values.copy_(variant.round_statics ? rounded_statics_ : statics_);
 }
 
 Score Laboratory::score(const Variant& variant) {
@@ -419,6 +428,12 @@ json compare_with_integers(Laboratory& laboratory, const Variant& variant,
           {"largest_head_difference", head_difference}};
 }
 
+// A package's static values beside a network that is rounded somehow.
+Variant packed(const torch::Tensor& weights,
+               std::shared_ptr<const model::FakeQuantisation> rounding) {
+  return {weights, std::move(rounding), true};
+}
+
 // Rows that differ in their calibration alone. "ptq" is what a package gets.
 std::vector<std::pair<std::string, CalibrationOptions>> calibrations(
     const CalibrationOptions& chosen) {
@@ -451,22 +466,23 @@ std::vector<Row> make_rows(const Network& network, const quantize::ActivationSta
   std::vector<Row> rows;
   for (const auto& [name, options] : calibrations(calibration)) {
     const quantize::Scales scales = quantize::choose_scales(network, statistics, options);
-    rows.push_back({name, {ptq.weights, quantize::fake_quantisation(scales)}, name == "ptq"});
+    rows.push_back({name, packed(ptq.weights, quantize::fake_quantisation(scales)), name == "ptq"});
   }
   if (qat) {
     rows.push_back({"qat", *qat, true});
     rows.push_back({"qat_weights_in_f32", {qat->weights, nullptr}});
   }
   const quantize::Scales scales = quantize::choose_scales(network, statistics, calibration);
-  rows.push_back({"dynamic", {ptq.weights, dynamic_ranges(scales)}, true});
-  rows.push_back({"ptq_int8_input", {ptq.weights, int8_input(scales, statistics.input_max)}, true});
+  rows.push_back({"dynamic", packed(ptq.weights, dynamic_ranges(scales)), true});
+  rows.push_back(
+      {"ptq_int8_input", packed(ptq.weights, int8_input(scales, statistics.input_max)), true});
   rows.push_back(
       {"only_input_int16", {ptq.weights, only_input(quantize::fake_quantisation(scales))}, true});
   rows.push_back({"only_input_int8",
                   {ptq.weights, only_input(int8_input(scales, statistics.input_max))},
                   true});
-  rows.push_back({"ptq_float_head", {ptq.weights, float_head(scales)}, true});
-  rows.push_back({"ptq_head_of_one_scale", {ptq.weights, head_of_one_scale(scales)}, true});
+  rows.push_back({"ptq_float_head", packed(ptq.weights, float_head(scales)), true});
+  rows.push_back({"ptq_head_of_one_scale", packed(ptq.weights, head_of_one_scale(scales)), true});
   return rows;
 }
 
@@ -505,13 +521,15 @@ json evaluate_quantization(train::TrainedAvatar& avatar, const train::RunDirecto
   const quantize::ActivationStatistics statistics =
       quantize::observe_activations(avatar, options.calibration.poses);
   const quantize::Scales scales = quantize::choose_scales(network, statistics, options.calibration);
-  const Variant ptq{unet.weights().detach().clone(), quantize::fake_quantisation(scales)};
+  const Variant ptq = packed(unet.weights().detach().clone(), quantize::fake_quantisation(scales));
   std::optional<Variant> qat;
   if (options.fine_tune) {
     const quantize::FineTuned tuned = quantize::fine_tune(avatar, run, *options.fine_tune);
-    qat = {weights_of(tuned.weights, unet), quantize::fake_quantisation(tuned.scales)};
+    qat = packed(weights_of(tuned.weights, unet), quantize::fake_quantisation(tuned.scales));
   }
-  const std::vector<Row> rows = make_rows(network, statistics, options.calibration, ptq, qat);
+  std::vector<Row> rows = make_rows(network, statistics, options.calibration, ptq, qat);
+  if (!avatar.model().statics().empty())
+    rows.push_back({"static_int8", packed(ptq.weights, nullptr), true});
   const std::vector<std::pair<json, Variant>> layers = single_layers(network, ptq.weights, scales);
 
   const train::InterruptGuard interrupt;

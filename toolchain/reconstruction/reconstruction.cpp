@@ -137,6 +137,7 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
                            "held_out_poses_block", "held_out_views_and_poses"}) {
     report[name] = to_json(groups[name]);
   }
+  report["parts"] = train::describe_parts(avatar.model());
   report["difference_psnr_db"] = finite(difference.psnr_db());
   report["definition"] =
       "PSNR over pixels whose true alpha exceeds 0.5, on stored sRGB values, over mid-grey, pooled "

@@ -7,6 +7,7 @@
 #include "formats/writer/package_writer.h"
 #include "ports/media/png.h"
 #include "toolchain/error.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 
 namespace figurine::train {
@@ -18,7 +19,27 @@ constexpr double kPoseDeviation_rad = 0.03;  // added to every feature's spread
 constexpr uint32_t kGoldenSize_px = 256;
 constexpr std::array<float, 3> kGoldenBackground{0.5f, 0.5f, 0.5f};
 
-std::vector<std::byte> golden_png(TrainedAvatar& avatar, const GoldenView& view) {
+// While it lives, the static values are those of a package.
+class WithStaticPart {
+ public:
+  WithStaticPart(StaticMap& map, const StaticPart& part, const model::HeadLayout& layout)
+      : map_(map), kept_(map.values) {
+    map_.values = map_.values.clone();
+    take_static_part(part, layout, map_);
+  }
+  ~WithStaticPart() { map_.values = kept_; }
+  WithStaticPart(const WithStaticPart&) = delete;
+  WithStaticPart& operator=(const WithStaticPart&) = delete;
+
+ private:
+  StaticMap& map_;
+  torch::Tensor kept_;
+};
+
+std::vector<std::byte> golden_png(TrainedAvatar& avatar, const StaticPart& part,
+                                  const GoldenView& view) {
+  const WithStaticPart rounded(avatar.model().statics(), part,
+                               head_layout(avatar.description().settings));
   const PosedBody posed = avatar.model().pose(view.pose.view());
   const std::vector<float> rgba =
       avatar.model().render_rgba(avatar.model().evaluate(posed), posed, view.camera);
@@ -183,9 +204,14 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
     throw InputError(
         run.path +
         ": was trained with a frozen body pose, an experiment that no device can repeat");
+  const RoundedMap statics(avatar.model().statics(), head_layout(settings));
   std::vector<float> storage;
-  Network network = avatar.model().unet().export_network(storage);
-  const std::vector<ValueShape> shapes = value_or_throw(infer_shapes(network, true), run.path);
+  Network network = make_network(settings);
+  uint64_t macs = 0;
+  if (settings.network) {
+    network = avatar.model().unet().export_network(storage);
+    macs = count_macs(network, value_or_throw(infer_shapes(network, true), run.path));
+  }
   if (!options.float_weights) {
     for (Layer& layer : network.layers) layer.weights = layer.bias = {};
   }
@@ -196,15 +222,16 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   }
   const PoseFeatures features = pose_features(rotations, avatar.body().joint_count());
   const GoldenView view = choose_golden_view(avatar);
-  const std::vector<std::byte> png =
-      options.golden && options.float_weights ? golden_png(avatar, view) : std::vector<std::byte>{};
+  const std::vector<std::byte> png = options.golden && options.float_weights
+                                         ? golden_png(avatar, statics.view(), view)
+                                         : std::vector<std::byte>{};
 
   Avatar content;
   content.kind() = {.body_name = avatar.body().name,
                     .body_hash = avatar.body_file().package.content_hash(),
                     .preset = settings.preset,
                     .template_mode = settings.template_mode,
-                    .fourier_octaves = settings.fourier_octaves,
+                    .fourier_octaves = settings.network ? settings.fourier_octaves : 0,
                     .network = network};
   content.traits() = {.map_statistics = {},
                       .decoding = settings.decoding,
@@ -218,11 +245,13 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   content.name = options.name.empty()
                      ? std::filesystem::path(avatar.data().directory()).filename().string()
                      : options.name;
+  content.uv_size = texel_side(settings);
   content.shape = avatar.model().shape();
   content.fixed_point = options.fixed_point;
+  content.static_part = statics.view();
   content.pose_statistics = {features.joints, features.mean, features.covariance};
   const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
-                                .macs_per_frame = count_macs(network, shapes),
+                                .macs_per_frame = macs,
                                 .gaussians = avatar.body().texel_count()};
   return value_or_throw(write_package(content, budget, make_provenance(avatar, run, options)),
                         run.path);

@@ -1,5 +1,5 @@
-// A run as an avatar package: network, decoding, shape, how unusual a pose is, where it all came
-// from, and a golden frame to test a device against.
+// A run as an avatar package: network, static part, decoding, shape, how unusual a pose is, where
+// it all came from, and a golden frame to test a device against.
 #pragma once
 
 #include <string>
@@ -48,7 +48,8 @@ PoseFeatures pose_features(const std::vector<std::vector<float>>& rotations, uin
 // The rotation vector (axis times angle, at most pi long) of a quaternion of any length, wxyz.
 std::array<double, 3> rotation_vector(const float* wxyz);
 
-// The package's bytes. Throws InputError: a run with frozen pose (a device always poses), missing
+// The package's bytes; the golden picture is of the static part as the package holds it. Throws
+// InputError: a run with frozen pose (a device always poses) or static colours as a sum, missing
 // consent, no weights.
 std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& run,
                                    const PackOptions& options);

@@ -74,27 +74,19 @@ torch::Tensor reference_head(const dataset::Dataset& data, const AvatarModel& mo
     }
   }
   const uint32_t channels = head_channels(model.settings().decoding.sh_degree);
-  torch::Tensor reference =
-      torch::zeros({int64_t(body.uv_size), int64_t(body.uv_size), int64_t(channels)});
+  torch::Tensor reference = torch::zeros({int64_t(count), int64_t(channels)});
   float* out = reference.data_ptr<float>();
   for (uint32_t i = 0; i < count; ++i) {
     for (int c = 0; c < 3; ++c) {
       const float value = weight[i] > 0 ? colour[3 * i + c] / weight[i] : kShOffset;
-      out[size_t(body.texel[i]) * channels + kColourChannel + c] = (value - kShOffset) / kSh0;
+      out[size_t(i) * channels + kColourChannel + c] = (value - kShOffset) / kSh0;
     }
   }
   return reference;
 }
 
-torch::Tensor reference_loss(const torch::Tensor& head, const torch::Tensor& reference,
-                             const Body& body) {
-  const int64_t channels = head.size(2);
-  torch::Tensor covered = torch::zeros({head.size(0) * head.size(1)});
-  float* mask = covered.data_ptr<float>();
-  for (uint32_t texel : body.texel) mask[texel] = 1;
-  const torch::Tensor squared = (head - reference).square().reshape({-1, channels});
-  return (squared * covered.unsqueeze(1)).sum() /
-         static_cast<double>(int64_t(body.texel_count()) * channels);
+torch::Tensor reference_loss(const torch::Tensor& head, const torch::Tensor& reference) {
+  return (head - reference).square().sum() / static_cast<double>(head.numel());
 }
 
 }  // namespace figurine::train

@@ -16,11 +16,10 @@
 
 namespace figurine::train {
 
-// [T,T,C] raw head outputs of the reference Gaussians; zero at texels that carry none.
+// [N,C] raw head outputs of the reference Gaussians.
 torch::Tensor reference_head(const dataset::Dataset& data, const AvatarModel& model);
 
-// Mean squared difference over the outputs of covered texels, differentiable by head.
-torch::Tensor reference_loss(const torch::Tensor& head, const torch::Tensor& reference,
-                             const Body& body);
+// Mean squared difference, differentiable by head.
+torch::Tensor reference_loss(const torch::Tensor& head, const torch::Tensor& reference);
 
 }  // namespace figurine::train

@@ -5,7 +5,6 @@
 
 #include <charconv>
 #include <cstdio>
-#include <cstring>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
@@ -17,6 +16,8 @@
 #include "toolchain/model/optimiser.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/tensor_operations.h"
+#include "toolchain/train/flat_tensor.h"
+#include "toolchain/train/static_map.h"
 
 namespace figurine::train {
 
@@ -93,19 +94,56 @@ void take_weights(const std::string& path, const TensorFile& file, model::PoseUN
   unet.import_network(network);
 }
 
-NamedTensor named(const torch::Tensor& tensor) {
-  const float* data = tensor.data_ptr<float>();
-  return {{tensor.numel()}, {data, data + tensor.numel()}};
+std::string static_name(size_t group) { return "static." + std::to_string(group); }
+
+void add_statics(const StaticMap& statics, TensorFile& file) {
+  const float* from = statics.empty() ? nullptr : statics.values.const_data_ptr<float>();
+  for (size_t g = 0; g < statics.shapes.size(); ++g) {
+    const auto [cells, channels] = statics.shapes[g];
+    file.tensors[static_name(g)] = {{cells, channels}, {from, from + cells * channels}};
+    from += cells * channels;
+  }
 }
 
-void take_moment(const std::string& path, const TensorFile& file, const std::string& name,
-                 torch::Tensor& moment) {
-  const auto found = file.tensors.find(name);
-  if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
-  if (found->second.values.size() != static_cast<size_t>(moment.numel()))
-    throw InputError(path + ": " + name + ": is of another size");
-  std::memcpy(moment.data_ptr<float>(), found->second.values.data(),
-              found->second.values.size() * sizeof(float));
+void take_statics(const std::string& path, const TensorFile& file, StaticMap& statics) {
+  float* to = statics.empty() ? nullptr : statics.values.mutable_data_ptr<float>();
+  for (size_t g = 0; g < statics.shapes.size(); ++g) {
+    const std::string name = static_name(g);
+    const auto found = file.tensors.find(name);
+    if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
+    const auto [cells, channels] = statics.shapes[g];
+    if (found->second.shape != std::vector<int64_t>{cells, channels})
+      throw InputError(path + ": " + name + ": is of another shape than this run's static part");
+    to = std::copy(found->second.values.begin(), found->second.values.end(), to);
+  }
+}
+
+void add_parts(const LearnedParts& parts, TensorFile& file) {
+  if (parts.unet != nullptr) add_weights(*parts.unet, file);
+  if (parts.statics != nullptr) add_statics(*parts.statics, file);
+}
+
+void take_parts(const std::string& path, const TensorFile& file, const LearnedParts& parts) {
+  if (parts.unet != nullptr) take_weights(path, file, *parts.unet);
+  if (parts.statics != nullptr) take_statics(path, file, *parts.statics);
+}
+
+// [P]'s state under "prefix.". Its number of steps by a key of its own.
+void add_optimiser(const std::string& prefix, const model::Optimiser& optimiser, TensorFile& file) {
+  file.tensors[prefix + ".first_moment"] = flat_tensor(optimiser.first_moment);
+  file.tensors[prefix + ".second_moment"] = flat_tensor(optimiser.second_moment);
+  file.metadata[prefix + "_steps"] = exact(static_cast<double>(optimiser.steps));
+}
+
+void take_optimiser(const std::string& path, const TensorFile& file, const std::string& prefix,
+                    model::Optimiser& optimiser) {
+  take_flat_tensor(file, path, prefix + ".first_moment", optimiser.first_moment);
+  take_flat_tensor(file, path, prefix + ".second_moment", optimiser.second_moment);
+  optimiser.steps = static_cast<int64_t>(parse_double(path, file.metadata, prefix + "_steps"));
+}
+
+std::string weights_file(const std::string& path) {
+  return std::filesystem::is_directory(path) ? RunDirectory{path}.weights() : path;
 }
 
 struct StageField {
@@ -114,6 +152,7 @@ struct StageField {
 };
 constexpr StageField kStageFields[] = {{"seconds_data", &StageSeconds::data},
                                        {"seconds_unet_forward", &StageSeconds::unet_forward},
+                                       {"seconds_compose", &StageSeconds::compose},
                                        {"seconds_splat_forward", &StageSeconds::splat_forward},
                                        {"seconds_loss", &StageSeconds::loss},
                                        {"seconds_splat_backward", &StageSeconds::splat_backward},
@@ -122,45 +161,58 @@ constexpr StageField kStageFields[] = {{"seconds_data", &StageSeconds::data},
 
 }  // namespace
 
-void save_weights(const RunDirectory& run, const model::PoseUNet& unet) {
+void save_weights(const RunDirectory& run, const LearnedParts& parts) {
   TensorFile file;
-  add_weights(unet, file);
+  add_parts(parts, file);
   write_tensor_file(run.weights(), file);
 }
 
-void load_weights(const std::string& path, model::PoseUNet& unet) {
-  const std::string file =
-      std::filesystem::is_directory(path) ? RunDirectory{path}.weights() : path;
-  take_weights(file, read_tensor_file(file), unet);
+void load_weights(const std::string& path, const LearnedParts& parts) {
+  const std::string file = weights_file(path);
+  take_parts(file, read_tensor_file(file), parts);
 }
 
-void save_checkpoint(const RunDirectory& run, const TrainingState& state,
-                     const model::PoseUNet& unet, const model::Optimiser& optimiser) {
+void load_weights(const std::string& path, model::PoseUNet& unet) {
+  load_weights(path, LearnedParts{.unet = &unet, .statics = nullptr});
+}
+
+void load_initial_weights(const std::string& path, const LearnedParts& parts) {
+  const std::string file = weights_file(path);
+  const TensorFile tensors = read_tensor_file(file);
+  LearnedParts there = parts;
+  if (!tensors.tensors.contains(static_name(0))) there.statics = nullptr;
+  take_parts(file, tensors, there);
+}
+
+void save_checkpoint(const RunDirectory& run, const TrainingState& state, const LearnedParts& parts,
+                     const PartOptimisers& optimisers) {
   TensorFile file;
-  add_weights(unet, file);
-  file.tensors["optimiser.first_moment"] = named(optimiser.first_moment);
-  file.tensors["optimiser.second_moment"] = named(optimiser.second_moment);
+  add_parts(parts, file);
+  if (optimisers.unet != nullptr) add_optimiser("optimiser", *optimisers.unet, file);
+  if (optimisers.statics != nullptr) add_optimiser("static_optimiser", *optimisers.statics, file);
   file.metadata["iteration"] = exact(static_cast<double>(state.iteration));
   file.metadata["seconds"] = exact(state.seconds);
-  file.metadata["optimiser_steps"] = exact(static_cast<double>(optimiser.steps));
   for (const StageField& field : kStageFields)
     file.metadata[field.name] = exact(state.stages.*field.member);
   write_tensor_file(run.checkpoint(), file);
 }
 
-TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet,
-                              model::Optimiser& optimiser) {
+TrainingState load_checkpoint(const RunDirectory& run, const LearnedParts& parts,
+                              const PartOptimisers& optimisers) {
   const std::string path = run.checkpoint();
   const TensorFile file = read_tensor_file(path);
   TrainingState state;
   state.iteration = static_cast<uint64_t>(parse_double(path, file.metadata, "iteration"));
   state.seconds = parse_double(path, file.metadata, "seconds");
-  for (const StageField& field : kStageFields)
-    state.stages.*field.member = parse_double(path, file.metadata, field.name);
-  take_weights(path, file, unet);
-  take_moment(path, file, "optimiser.first_moment", optimiser.first_moment);
-  take_moment(path, file, "optimiser.second_moment", optimiser.second_moment);
-  optimiser.steps = static_cast<int64_t>(parse_double(path, file.metadata, "optimiser_steps"));
+  for (const StageField& field : kStageFields) {
+    // Checkpoints of before there was such a stage say nothing of it.
+    if (file.metadata.contains(field.name) || field.member != &StageSeconds::compose)
+      state.stages.*field.member = parse_double(path, file.metadata, field.name);
+  }
+  take_parts(path, file, parts);
+  if (optimisers.unet != nullptr) take_optimiser(path, file, "optimiser", *optimisers.unet);
+  if (optimisers.statics != nullptr)
+    take_optimiser(path, file, "static_optimiser", *optimisers.statics);
   return state;
 }
 

@@ -4,8 +4,9 @@
 //                            seconds and where they went
 //   log.csv                  iteration, seconds, learning rate, loss, PSNR: means of the iterations
 //                            since the row before
-//   weights.safetensors      the UNet: layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out]
-//   checkpoint.safetensors   the same and what --resume needs: the optimiser's moments, iteration,
+//   weights.safetensors      the UNet: layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out]; and
+//                            static.G [M,channels], a static part's values group by group
+//   checkpoint.safetensors   the same and what --resume needs: the optimisers' moments, iteration,
 //                            seconds
 //   evaluation.json          by figurine-train evaluate reconstruction
 //
@@ -26,6 +27,8 @@ class Optimiser;
 
 namespace figurine::train {
 
+struct StaticMap;  // static_map.h
+
 struct RunDirectory {
   std::string path;
   std::string run_json() const { return path + "/run.json"; }
@@ -39,13 +42,15 @@ struct RunDirectory {
 struct StageSeconds {
   double data = 0;  // waiting for the feed
   double unet_forward = 0;
+  double compose = 0;  // head from network and static values, forward and backward
   double splat_forward = 0;
   double loss = 0;  // forward and backward: they are fused
   double splat_backward = 0;
   double unet_backward = 0;
   double optimiser = 0;
   double total() const {
-    return data + unet_forward + splat_forward + loss + splat_backward + unet_backward + optimiser;
+    return data + unet_forward + compose + splat_forward + loss + splat_backward + unet_backward +
+           optimiser;
   }
 };
 
@@ -61,15 +66,30 @@ struct LogRow {
   double seconds = 0, learning_rate = 0, loss = 0, psnr_db = 0;
 };
 
-void save_weights(const RunDirectory& run, const model::PoseUNet& unet);
-// A weights or checkpoint file, or a run folder. Throws InputError naming file and layer if a shape
-// differs.
-void load_weights(const std::string& path, model::PoseUNet& unet);
+// What training changes. Borrowed; null (statics: also empty) where an avatar has no such part.
+struct LearnedParts {
+  model::PoseUNet* unet = nullptr;
+  StaticMap* statics = nullptr;
+};
+// And what changes it.
+struct PartOptimisers {
+  model::Optimiser* unet = nullptr;
+  model::Optimiser* statics = nullptr;
+};
 
-void save_checkpoint(const RunDirectory& run, const TrainingState& state,
-                     const model::PoseUNet& unet, const model::Optimiser& optimiser);
-TrainingState load_checkpoint(const RunDirectory& run, model::PoseUNet& unet,
-                              model::Optimiser& optimiser);
+void save_weights(const RunDirectory& run, const LearnedParts& parts);
+// path: a weights or checkpoint file, or a run folder. Throws InputError naming file and tensor if
+// one is missing or a shape differs. What else the file holds is left alone.
+void load_weights(const std::string& path, const LearnedParts& parts);
+// The network alone.
+void load_weights(const std::string& path, model::PoseUNet& unet);
+// As load_weights, but static values that the file has none of stay as they are.
+void load_initial_weights(const std::string& path, const LearnedParts& parts);
+
+void save_checkpoint(const RunDirectory& run, const TrainingState& state, const LearnedParts& parts,
+                     const PartOptimisers& optimisers);
+TrainingState load_checkpoint(const RunDirectory& run, const LearnedParts& parts,
+                              const PartOptimisers& optimisers);
 
 void save_log(const RunDirectory& run, const std::vector<LogRow>& rows);
 // Rows up to and with `iteration`.

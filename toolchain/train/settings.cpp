@@ -23,6 +23,30 @@ constexpr std::array kBackgrounds{TrainingBackground::kBlack, TrainingBackground
                                   TrainingBackground::kRandom};
 constexpr std::array kOptimisers{OptimiserKind::kAdamW, OptimiserKind::kMuon};
 constexpr std::array kTemplateModes{TemplateMode::kMean, TemplateMode::kShaped};
+constexpr std::array kStaticColours{model::StaticColour::kGain, model::StaticColour::kSum};
+
+struct ChannelRange {
+  const char* name;
+  uint32_t first, count;
+};
+// Of HeadDecoding's outputs.
+constexpr ChannelRange kChannelRanges[] = {{"all", 0, kStaticChannels},
+                                           {"colour", kStaticColour, 3},
+                                           {"rest", 0, kStaticColour},
+                                           {"geometry", 0, 10},
+                                           {"offset", 0, 3},
+                                           {"scale", 3, 3},
+                                           {"rotation", 6, 4},
+                                           {"opacity", 10, 1}};
+
+ChannelRange find_channels(const std::string& name, const std::string& where) {
+  std::string known;
+  for (const ChannelRange& range : kChannelRanges) {
+    if (name == range.name) return range;
+    known += (known.empty() ? "" : ", ") + std::string(range.name);
+  }
+  throw InputError(where + ": static_grids: channels \"" + name + "\" are none of " + known);
+}
 
 void require(bool condition, const std::string& where, const char* what) {
   if (!condition) throw InputError(where + ": " + what);
@@ -53,9 +77,93 @@ uint32_t input_channels(const TrainSettings& settings) {
 }
 
 Network make_network(const TrainSettings& settings) {
-  const Preset& preset = find_preset(settings.preset);
-  return make_pose_unet(preset.uv_size, input_channels(settings), preset.channels,
-                        head_channels(settings.decoding.sh_degree));
+  if (!settings.network) return {};
+  return make_pose_unet(network_side(settings), input_channels(settings),
+                        network_channels(settings), head_channels(settings.decoding.sh_degree));
+}
+
+uint32_t texel_side(const TrainSettings& settings) {
+  return settings.uv_size > 0 ? settings.uv_size : find_preset(settings.preset).uv_size;
+}
+
+uint32_t network_side(const TrainSettings& settings) {
+  if (!settings.network) return 0;
+  return settings.network_size > 0 ? settings.network_size : texel_side(settings);
+}
+
+uint32_t network_channels(const TrainSettings& settings) {
+  return settings.channels > 0 ? settings.channels : find_preset(settings.preset).channels;
+}
+
+model::HeadLayout head_layout(const TrainSettings& settings) {
+  model::HeadLayout layout{.network_size = network_side(settings),
+                           .channels = head_channels(settings.decoding.sh_degree),
+                           .statics = {},
+                           .colour = settings.static_colour};
+  for (const StaticGrid& grid : settings.static_grids) {
+    const ChannelRange range = find_channels(grid.channels, "settings");
+    layout.statics.push_back({range.first, range.count, texel_side(settings) / grid.step});
+  }
+  return layout;
+}
+
+std::vector<StaticGrid> parse_static_grids(const std::string& text, const std::string& where) {
+  std::vector<StaticGrid> grids;
+  if (text == "none") return grids;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const std::string part = text.substr(begin, end - begin);
+    const size_t colon = part.find(':');
+    const std::string size = colon == std::string::npos ? "T" : part.substr(colon + 1);
+    StaticGrid grid{part.substr(0, colon), 0};
+    for (const uint32_t step : {1u, 2u, 4u, 8u}) {
+      if (size == (step == 1 ? "T" : "T/" + std::to_string(step))) grid.step = step;
+    }
+    if (grid.step == 0)
+      throw InputError(where + ": static_grids: size \"" + size + "\" is none of T, T/2, T/4, T/8");
+    find_channels(grid.channels, where);
+    grids.push_back(grid);
+    begin = end + 1;
+  }
+  return grids;
+}
+
+std::string to_string(const std::vector<StaticGrid>& grids) {
+  std::string text;
+  for (const StaticGrid& grid : grids) {
+    text += (text.empty() ? "" : ",") + grid.channels +
+            (grid.step == 1 ? ":T" : ":T/" + std::to_string(grid.step));
+  }
+  return text.empty() ? "none" : text;
+}
+
+void check_parts(const TrainSettings& settings, const std::string& where) {
+  const uint32_t side = texel_side(settings), network = network_side(settings);
+  require(side >= 8 && side <= kMaxUvSize, where, "uv_size: must be 8 to 1024");
+  if (settings.network) {
+    require(grid_fits(side, network) && network % 8 == 0, where,
+            "network_size: must be T, T/2, T/4 or T/8, and a multiple of 8");
+    require(settings.channels <= kMaxChannels / 2, where, "channels: more than 2048");
+  } else {
+    require(!settings.static_grids.empty(), where,
+            "network: without one there must be static_grids");
+    require(settings.network_size == 0 && settings.channels == 0, where,
+            "network: none has neither network_size nor channels");
+  }
+  std::array<bool, kStaticChannels> taken{};
+  for (const StaticGrid& grid : settings.static_grids) {
+    require(grid_fits(side, side / grid.step), where, "static_grids: a cell is no whole texels");
+    const ChannelRange range = find_channels(grid.channels, where);
+    for (uint32_t c = range.first; c < range.first + range.count; ++c) {
+      require(!taken[c], where, "static_grids: a channel is in two groups");
+      taken[c] = true;
+    }
+  }
+  for (const double value :
+       {settings.static_learning_rate, settings.static_penalty, settings.clip_gradient}) {
+    require(value >= 0 && std::isfinite(value), where,
+            "static_learning_rate, static_penalty, clip_gradient: must be finite and not negative");
+  }
 }
 
 bool has_fast_bf16() {
@@ -81,6 +189,10 @@ const char* to_string(TrainingBackground background) {
 
 const char* to_string(TemplateMode mode) { return mode == TemplateMode::kMean ? "mean" : "shaped"; }
 
+const char* to_string(model::StaticColour colour) {
+  return colour == model::StaticColour::kGain ? "gain" : "sum";
+}
+
 const char* to_string(OptimiserKind kind) {
   return kind == OptimiserKind::kMuon ? "muon" : "adamw";
 }
@@ -95,35 +207,67 @@ nlohmann::json to_json(const HeadDecoding& decoding) {
   return json;
 }
 
+// What runs before there were static parts did not say, and others need not.
+void add_parts(const TrainSettings& s, nlohmann::json& json) {
+  if (s.uv_size > 0) json["uv_size"] = s.uv_size;
+  if (!s.network) json["network"] = "none";
+  if (s.network_size > 0) json["network_size"] = s.network_size;
+  if (s.channels > 0) json["channels"] = s.channels;
+  if (s.clip_gradient > 0) json["clip_gradient"] = s.clip_gradient;
+  if (s.static_grids.empty()) return;
+  json["static_grids"] = to_string(s.static_grids);
+  json["static_colour"] = to_string(s.static_colour);
+  json["static_learning_rate"] = s.static_learning_rate;
+  json["static_penalty"] = s.static_penalty;
+}
+
+void read_parts(const nlohmann::json& json, const std::string& where, TrainSettings& s) {
+  s.uv_size = json.value("uv_size", 0u);
+  const std::string network = json.value("network", std::string("unet"));
+  require(network == "unet" || network == "none", where, "network: is neither unet nor none");
+  s.network = network != "none";
+  s.network_size = json.value("network_size", 0u);
+  s.channels = json.value("channels", 0u);
+  s.clip_gradient = json.value("clip_gradient", 0.0);
+  s.static_grids = parse_static_grids(json.value("static_grids", std::string("none")), where);
+  s.static_colour = parse(json.value("static_colour", std::string("gain")), kStaticColours,
+                          where + ": static_colour");
+  s.static_learning_rate = json.value("static_learning_rate", s.static_learning_rate);
+  s.static_penalty = json.value("static_penalty", 0.0);
+}
+
 nlohmann::json to_json(const TrainSettings& s) {
-  return {{"preset", s.preset},
-          {"template", to_string(s.template_mode)},
-          {"freeze_pose", s.freeze_pose},
-          {"fourier_octaves", s.fourier_octaves},
-          {"decoding", to_json(s.decoding)},
-          {"seed", s.seed},
-          {"init", s.init},
-          {"learning_rate", s.schedule.peak},
-          {"ramp_iterations", s.schedule.ramp_iterations},
-          {"learning_rate_floor", s.schedule.floor_fraction},
-          {"budget",
-           {{"iterations", s.schedule.budget.iterations}, {"seconds", s.schedule.budget.seconds}}},
-          {"optimiser", to_string(s.optimiser)},
-          {"adamw",
-           {{"beta1", s.beta1},
-            {"beta2", s.beta2},
-            {"epsilon", s.epsilon},
-            {"weight_decay", s.weight_decay}}},
-          {"precision", s.bf16 ? "bf16" : "f32"},
-          {"threads", s.threads},
-          {"views_per_pose", s.views_per_pose},
-          {"poses_per_iteration", s.poses_per_iteration},
-          {"loss", {{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}, {"lpips", 0.0}}},
-          {"standoff_weight", s.standoff_weight},
-          {"background", to_string(s.background)},
-          {"warmup_iterations", s.warmup_iterations},
-          {"crop_margin_px", s.crop_margin_px},
-          {"whole_image_period", s.whole_image_period}};
+  nlohmann::json json{
+      {"preset", s.preset},
+      {"template", to_string(s.template_mode)},
+      {"freeze_pose", s.freeze_pose},
+      {"fourier_octaves", s.fourier_octaves},
+      {"decoding", to_json(s.decoding)},
+      {"seed", s.seed},
+      {"init", s.init},
+      {"learning_rate", s.schedule.peak},
+      {"ramp_iterations", s.schedule.ramp_iterations},
+      {"learning_rate_floor", s.schedule.floor_fraction},
+      {"budget",
+       {{"iterations", s.schedule.budget.iterations}, {"seconds", s.schedule.budget.seconds}}},
+      {"optimiser", to_string(s.optimiser)},
+      {"adamw",
+       {{"beta1", s.beta1},
+        {"beta2", s.beta2},
+        {"epsilon", s.epsilon},
+        {"weight_decay", s.weight_decay}}},
+      {"precision", s.bf16 ? "bf16" : "f32"},
+      {"threads", s.threads},
+      {"views_per_pose", s.views_per_pose},
+      {"poses_per_iteration", s.poses_per_iteration},
+      {"loss", {{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}, {"lpips", 0.0}}},
+      {"standoff_weight", s.standoff_weight},
+      {"background", to_string(s.background)},
+      {"warmup_iterations", s.warmup_iterations},
+      {"crop_margin_px", s.crop_margin_px},
+      {"whole_image_period", s.whole_image_period}};
+  add_parts(s, json);
+  return json;
 }
 
 TrainSettings settings_from_json(const nlohmann::json& json, const std::string& where) {
@@ -169,10 +313,12 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     s.warmup_iterations = json.at("warmup_iterations").get<uint32_t>();
     s.crop_margin_px = json.at("crop_margin_px").get<uint32_t>();
     s.whole_image_period = json.at("whole_image_period").get<uint32_t>();
+    read_parts(json, where, s);
   } catch (const nlohmann::json::exception& error) {
     throw InputError(where + ": settings: " + error.what());
   }
   find_preset(s.preset);
+  check_parts(s, where);
   require(s.fourier_octaves <= 10, where, "fourier_octaves: more than 10");
   require(s.decoding.sh_degree <= kMaxShDegree, where, "decoding.sh_degree: more than 3");
   for (float value :

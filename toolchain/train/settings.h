@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "figurine/avatar.h"
+#include "toolchain/model/compose.h"
 #include "toolchain/train/schedule.h"
 
 namespace figurine::train {
@@ -35,8 +36,19 @@ enum class TrainingBackground : uint8_t { kBlack, kGrey, kRandom };
 // (toolchain/model/optimiser.h).
 enum class OptimiserKind : uint8_t { kAdamW, kMuon };
 
+// Static channels on one grid.
+struct StaticGrid {
+  std::string channels;  // all, colour, rest (all but colour), geometry (offset, scale and
+                         // rotation), offset, scale, rotation, opacity
+  uint32_t step = 1;     // T / G: texels a cell has, a side
+};
+
 struct TrainSettings {
   std::string preset = "edge";
+  uint32_t uv_size = 0;       // T; 0: the preset's
+  bool network = true;        // without one the static values are all there is
+  uint32_t network_size = 0;  // T_n: T / 1, 2, 4 or 8; 0: T
+  uint32_t channels = 0;      // C; 0: the preset's
   TemplateMode template_mode = TemplateMode::kShaped;
   bool freeze_pose = false;  // the network sees the rest pose in the true root orientation; the
                              // Gaussians are skinned with the true pose
@@ -50,6 +62,13 @@ struct TrainSettings {
                     .ramp_iterations = 50,
                     .floor_fraction = 0.02,
                     .budget = {.iterations = 0, .seconds = 600}};
+  std::vector<StaticGrid> static_grids;  // values a texel owns whatever the pose; none by default
+  model::StaticColour static_colour = model::StaticColour::kGain;  // packages hold gains alone
+  double static_learning_rate = 1.5e-2;  // peak of AdamW for the static values, on the network's
+                                         // schedule; 0: they stay
+  double static_penalty = 0;  // weight of the static values' mean square in the loss: what the
+                              // network can say as well it says
+  double clip_gradient = 0;   // largest norm of all gradients together; 0: none
   OptimiserKind optimiser = OptimiserKind::kMuon;
   // AdamW's. An epsilon of 1e-8 would swallow the small gradients of a mean loss.
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-10, weight_decay = 0;
@@ -75,8 +94,20 @@ struct TrainSettings {
 inline constexpr uint64_t kInitialWeightsSeed = 0;
 
 uint32_t input_channels(const TrainSettings& settings);
-// Shapes only.
+uint32_t texel_side(const TrainSettings& settings);        // T
+uint32_t network_side(const TrainSettings& settings);      // T_n; 0 without a network
+uint32_t network_channels(const TrainSettings& settings);  // C
+// Shapes only; without layers where there is no network.
 Network make_network(const TrainSettings& settings);
+// The settings must be sound (check_parts).
+model::HeadLayout head_layout(const TrainSettings& settings);
+
+// "colour:T,rest:T/2", or "none". Throws InputError "where: reason".
+std::vector<StaticGrid> parse_static_grids(const std::string& text, const std::string& where);
+std::string to_string(const std::vector<StaticGrid>& grids);
+
+// Throws InputError "where: FIELD: reason" unless network and static grids fit T and each other.
+void check_parts(const TrainSettings& settings, const std::string& where);
 
 // Settings of a preset with its own Fourier channels and SH degree, all else as above.
 TrainSettings preset_settings(const std::string& name);
@@ -87,6 +118,7 @@ bool has_fast_bf16();
 const char* to_string(TrainingBackground background);
 const char* to_string(TemplateMode mode);
 const char* to_string(OptimiserKind kind);
+const char* to_string(model::StaticColour colour);
 
 nlohmann::json to_json(const TrainSettings& settings);
 // Throws InputError "where: FIELD: reason".

@@ -36,7 +36,7 @@ TrainedAvatar TrainedAvatar::open(const OpenRunOptions& options) {
                                                 settings, false);
   if (!std::filesystem::exists(run.weights()))
     throw InputError(options.run + ": has no weights yet");
-  load_weights(run.weights(), avatar.model_->unet());
+  load_weights(run.weights(), avatar.model_->parts());
   return avatar;
 }
 

@@ -64,7 +64,8 @@ struct IterationResult {
 // What one pose of an iteration gave.
 struct PoseResult {
   IterationResult result;
-  torch::Tensor gradients;  // [P]
+  torch::Tensor gradients;         // [P] of the network; undefined without one
+  torch::Tensor static_gradients;  // of the static values; undefined without any
   StageSeconds stages;
 };
 
@@ -78,6 +79,20 @@ void use_lane_threads(const TrainSettings& settings) {
   at::set_num_threads(static_cast<int>(settings.threads / lane_count(settings)));
 }
 
+std::vector<model::ParameterGroup> network_groups(const AvatarModel& model) {
+  if (!model.has_network()) return {};
+  return model.settings().optimiser == OptimiserKind::kMuon
+             ? model.unet().muon_groups()
+             : model::adamw_group(model.unet().parameter_count());
+}
+
+model::OptimiserOptions adamw_options(const TrainSettings& settings, double weight_decay) {
+  return {.beta1 = settings.beta1,
+          .beta2 = settings.beta2,
+          .epsilon = settings.epsilon,
+          .weight_decay = weight_decay};
+}
+
 class Trainer {
  public:
   Trainer(const TrainRequest& request, const TrainSettings& settings, const PackageFile& body,
@@ -88,18 +103,16 @@ class Trainer {
         data_(data),
         description_(std::move(description)),
         model_(body.package.body(), data.shape(), lane_settings(), settings.bf16),
-        optimiser_(settings.optimiser == OptimiserKind::kMuon
-                       ? model_.unet().muon_groups()
-                       : model::adamw_group(model_.unet().parameter_count()),
-                   {.beta1 = settings.beta1,
-                    .beta2 = settings.beta2,
-                    .epsilon = settings.epsilon,
-                    .weight_decay = settings.weight_decay}) {
+        optimiser_(network_groups(model_), adamw_options(settings, settings.weight_decay)),
+        static_optimiser_(
+            model::adamw_group(static_cast<uint64_t>(model_.statics().values.numel())),
+            adamw_options(settings, 0)) {
     for (unsigned lane = 1; lane < lane_count(settings_); ++lane) {
       replicas_.push_back(std::make_unique<AvatarModel>(body.package.body(), data.shape(),
                                                         lane_settings(), settings.bf16));
-      replicas_.back()->unet().share_weights(model_.unet());
+      replicas_.back()->share_parts(model_);
     }
+    if (request.fake_quantisation == nullptr) return;
     for (unsigned lane = 0; lane < lane_count(settings_); ++lane)
       model_of(lane).unet().set_fake_quantisation(request.fake_quantisation);
   }
@@ -156,14 +169,27 @@ class Trainer {
     return settings;
   }
 
+  PartOptimisers optimisers() {
+    return {.unet = model_.has_network() ? &optimiser_ : nullptr,
+            .statics = model_.statics().empty() ? nullptr : &static_optimiser_};
+  }
+
+  // What a package in fixed point holds of the static values.
+  void round_statics() {
+    const model::HeadLayout layout = head_layout(settings_);
+    take_static_part(RoundedMap(model_.statics(), layout).view(), layout, model_.statics());
+  }
+
   AvatarModel& model_of(unsigned lane) { return lane == 0 ? model_ : *replicas_[lane - 1]; }
 
   void start() {
     if (request_.resume && std::filesystem::exists(run_.checkpoint())) {
-      state_ = load_checkpoint(run_, model_.unet(), optimiser_);
+      state_ = load_checkpoint(run_, model_.parts(), optimisers());
       rows_ = load_log(run_, state_.iteration);
     } else {
-      if (!settings_.init.empty()) load_weights(settings_.init, model_.unet());
+      if (!settings_.init.empty()) load_initial_weights(settings_.init, model_.parts());
+      if (request_.fake_quantisation != nullptr) round_statics();
+      description_["parts"] = describe_parts(model_);
       write_json(run_.run_json(), description_);
     }
     if (state_.iteration < settings_.warmup_iterations) reference_ = reference_head(data_, model_);
@@ -186,25 +212,57 @@ class Trainer {
     StageClock last;
     IterationResult result;
     // In the order of the poses, whatever thread they ran on.
-    torch::Tensor gradients = poses[0].gradients;
+    torch::Tensor gradients = poses[0].gradients, static_gradients = poses[0].static_gradients;
     for (uint32_t i = 0; i < count; ++i) {
       if (!std::isfinite(poses[i].result.loss)) fail(samples[i], "the loss is not finite");
-      if (i > 0) gradients.add_(poses[i].gradients);
+      if (i > 0 && gradients.defined()) gradients.add_(poses[i].gradients);
+      if (i > 0 && static_gradients.defined()) static_gradients.add_(poses[i].static_gradients);
       result.loss += poses[i].result.loss / count;
       result.squared_error += poses[i].result.squared_error;
       result.foreground += poses[i].result.foreground;
     }
-    if (count > 1) gradients.mul_(1.0 / count);
-    if (!optimiser_.step(model_.unet().weights(), gradients, rate))
-      fail(samples[0], "a gradient is not finite");
+    for (torch::Tensor* part : {&gradients, &static_gradients}) {
+      if (count > 1 && part->defined()) part->mul_(1.0 / count);
+    }
+    result.loss += add_penalty(static_gradients);
+    if (!step(gradients, static_gradients, rate)) fail(samples[0], "a gradient is not finite");
     last.add(state_.stages.optimiser);
     return result;
+  }
+
+  // Of the static values' mean square: returns its share of the loss.
+  double add_penalty(torch::Tensor& static_gradients) const {
+    if (settings_.static_penalty == 0 || !static_gradients.defined()) return 0;
+    const torch::Tensor& values = model_.statics().values;
+    const double weight = settings_.static_penalty / static_cast<double>(values.numel());
+    static_gradients.add_(values, 2 * weight);
+    return weight * values.square().sum().item<double>();
+  }
+
+  // Both parts or, where a gradient is not finite, none.
+  bool step(torch::Tensor& gradients, torch::Tensor& static_gradients, double rate) {
+    double squared = 0;
+    for (const torch::Tensor* part : {&gradients, &static_gradients}) {
+      if (part->defined()) squared += model::squared_norm(*part);
+    }
+    if (!std::isfinite(squared)) return false;
+    gradient_norm_ = std::sqrt(squared);
+    const double most = settings_.clip_gradient;
+    for (torch::Tensor* part : {&gradients, &static_gradients}) {
+      if (part->defined() && most > 0 && gradient_norm_ > most) part->mul_(most / gradient_norm_);
+    }
+    if (gradients.defined() && !optimiser_.step(model_.unet().weights(), gradients, rate))
+      return false;
+    const double static_rate = rate * settings_.static_learning_rate / settings_.schedule.peak;
+    return !static_gradients.defined() || static_rate == 0 ||
+           static_optimiser_.step(model_.statics().values, static_gradients, static_rate);
   }
 
   // Stages of lane 0; the others' run beside them.
   void add_stages(const StageSeconds& stages) {
     StageSeconds& sum = state_.stages;
     sum.unet_forward += stages.unet_forward, sum.unet_backward += stages.unet_backward;
+    sum.compose += stages.compose;
     sum.splat_forward += stages.splat_forward, sum.splat_backward += stages.splat_backward;
     sum.loss += stages.loss;
   }
@@ -213,35 +271,46 @@ class Trainer {
   PoseResult pose_iteration(const Sample& sample, AvatarModel& model, double fade) const {
     StageClock clock;
     PoseResult pose;
-    model.unet().zero_gradients();
-    const torch::Tensor head = model.unet().forward(sample.posed.input);
+    torch::Tensor output;
+    if (model.has_network()) {
+      model.unet().zero_gradients();
+      output = model.unet().forward(sample.posed.input);
+    }
     clock.add(pose.stages.unet_forward);
+    const torch::Tensor head = model.compose(output).requires_grad_();
+    clock.add(pose.stages.compose);
     if (sample.number / settings_.poses_per_iteration < settings_.warmup_iterations) {
-      const torch::Tensor loss = reference_loss(head, reference_, model.body());
+      const torch::Tensor loss = reference_loss(head, reference_);
       pose.result.loss = loss.item<double>();
       loss.backward();
-      clock.add(pose.stages.unet_backward);
+      clock.add(pose.stages.loss);
     } else {
       pose.result = image_iteration(sample, head, model, fade, clock, pose.stages);
     }
-    pose.gradients = model.unet().gradients();
+    const PartGradients parts = model.compose_backward(output, head.grad());
+    pose.static_gradients = parts.statics;
+    clock.add(pose.stages.compose);
+    if (model.has_network()) {
+      output.backward(parts.network);
+      pose.gradients = model.unet().gradients();
+    }
+    clock.add(pose.stages.unet_backward);
     return pose;
   }
 
-  // The graph is cut at the head and at the pictures, so that each part's backward pass can be
-  // timed and the views of a pose can share one run of the network. Gradients are those of the mean
-  // loss of the views.
+  // The graph is cut at the network's output, the head and the pictures, so that each part's
+  // backward pass can be timed and the views of a pose can share one run of the network. Gradients
+  // are those of the mean loss of the views; they are added to the head's, a leaf.
   IterationResult image_iteration(const Sample& sample, const torch::Tensor& head,
                                   AvatarModel& model, double fade, StageClock& clock,
                                   StageSeconds& stages) const {
-    const torch::Tensor head_leaf = head.detach().requires_grad_();
     std::vector<double> pulls(
         fade * settings_.standoff_weight > 0 ? model.body().texel_position_m.size() : 0);
     const double share = 1.0 / static_cast<double>(sample.views.size());
     IterationResult result;
     for (const SampleView& view : sample.views) {
       const torch::Tensor image =
-          model.renderer().render(head_leaf, model.head_frame(sample.posed), view.view);
+          model.renderer().render(head, model.head_frame(sample.posed), view.view);
       clock.add(stages.splat_forward);
       const torch::Tensor image_leaf = image.detach().requires_grad_();
       model::LossTerms terms;
@@ -262,9 +331,7 @@ class Trainer {
     }
     if (!pulls.empty())
       add_offset_gradient(model.head_frame(sample.posed), pulls,
-                          head_leaf.grad().mutable_data_ptr<float>());
-    head.backward(head_leaf.grad());
-    clock.add(stages.unet_backward);
+                          head.grad().mutable_data_ptr<float>());
     return result;
   }
 
@@ -309,8 +376,8 @@ class Trainer {
   double shown_psnr() const { return shown_mse_ > 0 ? -10 * std::log10(shown_mse_) : 0; }
 
   void save(const char* status) {
-    save_checkpoint(run_, state_, model_.unet(), optimiser_);
-    save_weights(run_, model_.unet());
+    save_checkpoint(run_, state_, model_.parts(), optimisers());
+    save_weights(run_, model_.parts());
     save_log(run_, rows_);
     const double iterations = static_cast<double>(std::max<uint64_t>(1, state_.iteration));
     const StageSeconds& s = state_.stages;
@@ -321,12 +388,14 @@ class Trainer {
         state_.seconds > 0 ? static_cast<double>(state_.iteration) / state_.seconds : 0.0;
     description_["breakdown_ms"] = {{"data", 1e3 * s.data / iterations},
                                     {"unet_forward", 1e3 * s.unet_forward / iterations},
+                                    {"compose", 1e3 * s.compose / iterations},
                                     {"splat_forward", 1e3 * s.splat_forward / iterations},
                                     {"loss", 1e3 * s.loss / iterations},
                                     {"splat_backward", 1e3 * s.splat_backward / iterations},
                                     {"unet_backward", 1e3 * s.unet_backward / iterations},
                                     {"optimiser", 1e3 * s.optimiser / iterations}};
-    description_["running"] = {{"loss", shown_loss_}, {"psnr_db", shown_psnr()}};
+    description_["running"] = {
+        {"loss", shown_loss_}, {"psnr_db", shown_psnr()}, {"gradient_norm", gradient_norm_}};
     description_["updated"] = utc_now();
     write_json(run_.run_json(), description_);
   }
@@ -339,12 +408,13 @@ class Trainer {
   AvatarModel model_;
   std::vector<std::unique_ptr<AvatarModel>> replicas_;  // of lanes 1..; their weights are model_'s
   Lanes lanes_{lane_count(settings_), [settings = settings_] { use_lane_threads(settings); }};
-  model::Optimiser optimiser_;
+  model::Optimiser optimiser_, static_optimiser_;
   torch::Tensor reference_;
   TrainingState state_;
   std::vector<LogRow> rows_;
   Means means_;
   double shown_loss_ = 0, shown_mse_ = -1;
+  double gradient_norm_ = 0;  // of the last step, before clipping
   uint64_t shown_count_ = 0;
 };
 
@@ -354,9 +424,11 @@ nlohmann::json describe(const TrainRequest& request, const TrainSettings& settin
   for (const dataset::CaptureCamera& camera : data.cameras()) held_out_cameras += camera.held_out;
   uint32_t frames[3] = {0, 0, 0};
   for (const dataset::CaptureFrame& frame : data.frames()) ++frames[static_cast<int>(frame.split)];
-  Network network = make_network(settings);
-  const std::vector<ValueShape> shapes =
-      value_or_throw(infer_shapes(network, false), settings.preset);
+  const Network network = make_network(settings);
+  const uint64_t macs =
+      settings.network
+          ? count_macs(network, value_or_throw(infer_shapes(network, false), settings.preset))
+          : 0;
   return {{"format", kRunFormat},
           {"status", "running"},
           {"tool", "figurine-train " FIGURINE_VERSION},
@@ -365,7 +437,7 @@ nlohmann::json describe(const TrainRequest& request, const TrainSettings& settin
           {"commit", current_commit()},
           {"machine", describe_machine()},
           {"settings", to_json(settings)},
-          {"macs_per_frame", count_macs(network, shapes)},
+          {"macs_per_frame", macs},
           {"body",
            {{"path", request.body},
             {"name", body.package.body().name},
@@ -437,6 +509,7 @@ TrainResult train_avatar(const TrainRequest& request) {
   const dataset::Dataset data =
       dataset::Dataset::open(request.data, {.body = &body.package.body(), .body_hash = body_hash});
   if (!exists) {
+    check_parts(settings, "settings");
     description = describe(request, settings, body, data);
     description.update(request.notes);
     std::error_code error;

@@ -35,7 +35,8 @@ struct TrainRequest {
   double checkpoint_period_s = 30;
   uint64_t stop_after = 0;  // interrupt before this iteration, as Ctrl-C would; 0: never (tests)
   std::shared_ptr<const model::FakeQuantisation>
-      fake_quantisation;  // of the UNet while training; needs settings.bf16 off. Null: none
+      fake_quantisation;  // of the UNet while training; needs settings.bf16 off. Static values are
+                          // then rounded as in a package before the first iteration. Null: none
   nlohmann::json notes = nlohmann::json::object();  // further entries of a new run's run.json
 };
 

@@ -64,7 +64,9 @@ ParityReport compare_with_runtime(train::TrainedAvatar& avatar, const Avatar& de
       value_or_throw(Renderer::create({.threads = options.threads}), "runtime");
   const AvatarId id = value_or_throw(
       renderer->add_avatar(device, avatar.body_file().package, options.precision), "runtime");
-  if (options.precision == Precision::kFixedPoint)
+  train::take_static_part(device.static_part, train::head_layout(avatar.model().settings()),
+                          avatar.model().statics());
+  if (options.precision == Precision::kFixedPoint && avatar.model().has_network())
     quantize::imitate(device.fixed_point, avatar.model().unet());
   const dataset::Dataset& data = avatar.data();
   ParityReport report;

@@ -101,8 +101,8 @@ TEST_F(RunDirectoryTest, CheckpointRestoresWeightsMomentsAndCounters) {
   optimiser.steps = 123456;
   const RunDirectory run{folder_.string()};
   TrainingState state{.iteration = 123456, .seconds = 1.0 / 3, .stages = {.loss = 0.1}};
-  save_checkpoint(run, state, unet, optimiser);
-  const TrainingState read = load_checkpoint(run, other, restored);
+  save_checkpoint(run, state, {.unet = &unet}, {.unet = &optimiser});
+  const TrainingState read = load_checkpoint(run, {.unet = &other}, {.unet = &restored});
   EXPECT_EQ(read.iteration, state.iteration);
   EXPECT_EQ(read.seconds, state.seconds);
   EXPECT_EQ(read.stages.loss, 0.1);
@@ -114,7 +114,7 @@ TEST_F(RunDirectoryTest, CheckpointRestoresWeightsMomentsAndCounters) {
 
 TEST_F(RunDirectoryTest, WeightsOfAnotherShapeAreRefusedByName) {
   model::PoseUNet nano(make_network(preset_settings("nano")), {});
-  save_weights({folder_.string()}, nano);
+  save_weights({folder_.string()}, {.unet = &nano});
   TrainSettings wider = preset_settings("nano");
   wider.fourier_octaves = 0;
   model::PoseUNet other(make_network(wider), {});
@@ -135,6 +135,51 @@ TEST_F(RunDirectoryTest, SettingsReadBackEqual) {
   settings.bf16 = true;
   const nlohmann::json json = to_json(settings);
   EXPECT_EQ(to_json(settings_from_json(json, "test")), json);
+}
+
+TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritten) {
+  TrainSettings settings = preset_settings("edge");
+  const nlohmann::json plain = to_json(settings);
+  for (const char* key : {"network", "network_size", "channels", "uv_size", "static_grids",
+                          "static_colour", "static_learning_rate", "clip_gradient"}) {
+    EXPECT_FALSE(plain.contains(key)) << key;
+  }
+  EXPECT_EQ(network_side(settings), 128u);
+  settings.uv_size = 256;
+  settings.network_size = 64;
+  settings.channels = 16;
+  settings.clip_gradient = 0.5;
+  settings.static_colour = model::StaticColour::kSum;
+  settings.static_learning_rate = 5e-3;
+  settings.static_grids = parse_static_grids("colour:T,rest:T/2", "test");
+  const nlohmann::json json = to_json(settings);
+  EXPECT_EQ(json.at("static_grids"), "colour:T,rest:T/2");
+  const TrainSettings read = settings_from_json(json, "test");
+  EXPECT_EQ(to_json(read), json);
+  const model::HeadLayout layout = head_layout(read);
+  EXPECT_EQ(layout.network_size, 64u);
+  ASSERT_EQ(layout.statics.size(), 2u);
+  EXPECT_EQ(layout.statics[0].first, kStaticColour);
+  EXPECT_EQ(layout.statics[0].grid_size, 256u);
+  EXPECT_EQ(layout.statics[1].count, kStaticColour);
+  EXPECT_EQ(layout.statics[1].grid_size, 128u);
+  EXPECT_EQ(network_channels(read), 16u);
+}
+
+TEST_F(RunDirectoryTest, StaticGridsAreRefusedByName) {
+  const auto error = [](const std::string& text) {
+    try {
+      parse_static_grids(text, "--static-grids");
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(error("hair:T").find("\"hair\""), std::string::npos) << error("hair:T");
+  EXPECT_NE(error("all:T/3").find("\"T/3\""), std::string::npos) << error("all:T/3");
+  EXPECT_NE(error("").find("static_grids"), std::string::npos) << error("");
+  EXPECT_NE(error("all:T,").find("static_grids"), std::string::npos) << error("all:T,");
+  EXPECT_TRUE(parse_static_grids("none", "test").empty());
 }
 
 TEST_F(RunDirectoryTest, SettingsOfOlderRunsHaveNoStandoff) {

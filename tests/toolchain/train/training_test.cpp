@@ -175,6 +175,187 @@ TEST(Lanes, PassOnWhatTheLowestLaneThrewAndGoOn) {
   EXPECT_EQ(calls, (std::array<int, 3>{2, 2, 2}));
 }
 
+// All static values at T beside a network at half the side.
+TrainRequest both_parts(const std::string& run, uint64_t iterations) {
+  TrainRequest both = request(run, iterations);
+  both.settings.network_size = 16;
+  both.settings.static_grids = parse_static_grids("all:T", "test");
+  return both;
+}
+
+TEST(Training, OfAStaticPartAndACoarseNetworkBeatsTheNetworkAlone) {
+  const TemporaryFolder folder;
+  train_avatar(both_parts(folder.path("run"), kIterations));
+  TrainedAvatar both = TrainedAvatar::open({.run = folder.path("run")}),
+                alone = TrainedAvatar::open({.run = trained_run()});
+  const nlohmann::json report = reconstruction::evaluate_reconstruction(both, {.quiet = true}),
+                       plain = reconstruction::evaluate_reconstruction(alone, {.quiet = true});
+  for (const char* group : {"held_out_views", "held_out_poses"}) {
+    const double psnr = report.at(group).at("psnr_db"), other = plain.at(group).at("psnr_db");
+    std::printf("%s: %.2f dB, the network alone %.2f dB\n", group, psnr, other);
+    EXPECT_GT(psnr, other + 0.5) << group;
+  }
+  const nlohmann::json& parts = report.at("parts");
+  EXPECT_EQ(parts.at("network").at("size"), 16);
+  EXPECT_EQ(parts.at("network").at("parameters"), 11326);
+  const uint64_t values = uint64_t{14} * both.body().texel_count();
+  EXPECT_EQ(parts.at("static").at("values"), values);
+  EXPECT_EQ(parts.at("static").at("bytes"), values + 4 * 14);
+  EXPECT_EQ(read_run({folder.path("run")}).json.at("parts"), parts);
+  EXPECT_TRUE(plain.at("parts").at("static").is_null());
+}
+
+TEST(Training, OfStaticValuesAloneBeatsAFlatColour) {
+  const TemporaryFolder folder;
+  TrainRequest alone = request(folder.path("run"), 150);
+  alone.settings.network = false;
+  alone.settings.static_grids = parse_static_grids("colour:T,rest:T/2", "test");
+  train_avatar(alone);
+  const TensorFile weights = read_tensor_file(RunDirectory{alone.run}.weights());
+  EXPECT_EQ(weights.tensors.size(), 2u);
+  TrainedAvatar avatar = TrainedAvatar::open({.run = alone.run});
+  EXPECT_EQ(weights.tensors.at("static.0").shape,
+            (std::vector<int64_t>{avatar.body().texel_count(), 3}));
+  EXPECT_THROW(avatar.model().unet(), InputError);
+  const nlohmann::json report = reconstruction::evaluate_reconstruction(avatar, {.quiet = true});
+  const double psnr = report.at("held_out_views").at("psnr_db"),
+               flat = report.at("held_out_views").at("flat_psnr_db");
+  std::printf("held-out views: %.2f dB, flat colour %.2f dB\n", psnr, flat);
+  EXPECT_GT(psnr, flat + 1);
+  EXPECT_TRUE(report.at("parts").at("network").is_null());
+}
+
+TEST(Training, OfBothPartsGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  TrainRequest straight = both_parts(folder.path("straight"), 12);
+  straight.settings.static_grids = parse_static_grids("colour:T,rest:T/2", "test");
+  straight.settings.static_penalty = 1e-3;
+  straight.settings.clip_gradient = 1e-3;
+  straight.settings.poses_per_iteration = 2;
+  train_avatar(straight);
+  TrainRequest broken = straight;
+  broken.run = folder.path("broken");
+  broken.settings.threads = 2;
+  broken.stop_after = 5;
+  EXPECT_THROW(train_avatar(broken), Interrupted);
+  broken.stop_after = 0;
+  broken.resume = true;
+  train_avatar(broken);
+  const std::string weights = bytes_of(RunDirectory{straight.run}.weights());
+  EXPECT_TRUE(weights == bytes_of(RunDirectory{broken.run}.weights()));
+  // Every one of these settings counts.
+  const auto without = [&](const char* name, auto change) {
+    TrainRequest other = straight;
+    other.run = folder.path(name);
+    change(other.settings);
+    train_avatar(other);
+    EXPECT_FALSE(weights == bytes_of(RunDirectory{other.run}.weights())) << name;
+    return read_tensor_file(RunDirectory{other.run}.weights());
+  };
+  without("no_penalty", [](TrainSettings& settings) { settings.static_penalty = 0; });
+  without("no_clip", [](TrainSettings& settings) { settings.clip_gradient = 0; });
+  without("sum", [](TrainSettings& s) { s.static_colour = model::StaticColour::kSum; });
+  const TensorFile still =
+      without("still", [](TrainSettings& settings) { settings.static_learning_rate = 0; });
+  for (const float value : still.tensors.at("static.1").values) ASSERT_EQ(value, 0);
+}
+
+TEST(Training, FromAnotherRunTakesItsStaticPartOrTheNetworkAlone) {
+  const TemporaryFolder folder;
+  train_avatar(both_parts(folder.path("first"), 10));
+  const TensorFile first = read_tensor_file(RunDirectory{folder.path("first")}.weights());
+  TrainRequest still = both_parts(folder.path("still"), 3);
+  still.settings.init = folder.path("first");
+  still.settings.static_learning_rate = 0;
+  train_avatar(still);
+  EXPECT_EQ(read_tensor_file(RunDirectory{still.run}.weights()).tensors.at("static.0").values,
+            first.tensors.at("static.0").values);
+  TrainRequest plain = request(folder.path("plain"), 3);
+  plain.settings.network_size = 16;
+  plain.settings.init = folder.path("first");
+  train_avatar(plain);
+  EXPECT_FALSE(read_tensor_file(RunDirectory{plain.run}.weights()).tensors.contains("static.0"));
+  TrainRequest finer = still;
+  finer.run = folder.path("finer");
+  finer.settings.static_grids = parse_static_grids("all:T/2", "test");
+  EXPECT_NE(error_of(finer).find("static.0"), std::string::npos) << error_of(finer);
+}
+
+TEST(Training, WithStaticColoursAsASumIsRefusedByPack) {
+  const TemporaryFolder folder;
+  TrainRequest sum = both_parts(folder.path("run"), 3);
+  sum.settings.static_colour = model::StaticColour::kSum;
+  train_avatar(sum);
+  TrainedAvatar avatar = TrainedAvatar::open({.run = sum.run});
+  EXPECT_THROW(pack_avatar(avatar, {sum.run}, {}), InputError);
+}
+
+TEST(AvatarModel, SeesOnACoarseGridWhatTheSourceTexelsShow) {
+  TrainSettings settings = preset_settings("nano");
+  const PackageFile body = open_package(small_capture().body, PackageKind::kBody);
+  const dataset::Dataset data =
+      dataset::Dataset::open(small_capture().data, {.body = &body.package.body()});
+  const AvatarModel fine(body.package.body(), data.shape(), settings, false);
+  settings.network_size = 8;
+  const AvatarModel coarse(body.package.body(), data.shape(), settings, false);
+  const OwnedPose pose = fine.from_capture(data.frames()[7]);
+  const torch::Tensor at_texels = fine.pose(pose.view()).input.flatten(0, 1),
+                      at_cells = coarse.pose(pose.view()).input.flatten(0, 1);
+  const TexelGrid grid = make_texel_grid(body.package.body(), 8);
+  torch::Tensor maps = torch::zeros({64, kMapChannels});
+  for (size_t i = 0; i < grid.cell.size(); ++i)
+    maps[grid.cell[i]] =
+        at_texels[body.package.body().texel[grid.source[i]]].narrow(0, 0, kMapChannels);
+  for (size_t i = 0; i < grid.border_cell.size(); ++i)
+    maps[grid.border_cell[i]] = maps[grid.cell[grid.border_source[i]]];
+  EXPECT_TRUE(torch::equal(at_cells.narrow(1, 0, kMapChannels), maps));
+  std::vector<float> fourier(64 * 20);
+  draw_fourier_channels(8, 5, 0, 20, fourier);
+  EXPECT_TRUE(torch::equal(at_cells.narrow(1, kMapChannels, 20),
+                           torch::from_blob(fourier.data(), {64, 20})));
+}
+
+TEST(RoundedMap, ComesBackWithNoLargerErrorThanStepsOfTheLargestValueGive) {
+  TrainSettings settings = preset_settings("nano");
+  settings.static_grids = parse_static_grids("colour:T,opacity:T/4", "test");
+  const PackageFile body = open_package(small_capture().body, PackageKind::kBody);
+  const model::HeadLayout layout = head_layout(settings);
+  StaticMap map(model::HeadComposer(body.package.body(), layout));
+  map.values.copy_(
+      torch::randn({map.values.numel()}, at::make_generator<at::CPUGeneratorImpl>(uint64_t{3})));
+  const auto colours = [](const StaticMap& of) {
+    return of.values.narrow(0, 0, of.shapes[0][0] * 3).view({of.shapes[0][0], 3});
+  };
+  colours(map).select(1, 1).zero_();  // a channel that says nothing
+  const RoundedMap rounded(map, layout);
+  const StaticPart part = rounded.view();
+  ASSERT_EQ(part.groups.size(), 2u);
+  EXPECT_EQ(rounded.value_count(), size_t(map.values.numel()));
+  EXPECT_EQ(part.groups[1].grid_size, 8u);
+  EXPECT_EQ(part.groups[0].scale[1], 1.0f / 127);
+  EXPECT_TRUE(validate_static_part(part, body.package.body()).ok());
+  StaticMap back = map;
+  back.values = map.values.clone();
+  take_static_part(part, layout, back);
+  for (const int64_t channel : {0, 1, 2}) {
+    const torch::Tensor values = colours(map).select(1, channel);
+    const double step = std::max(1e-9, values.abs().max().item<double>() / 127);
+    const torch::Tensor plain = (values / step).round() * step;
+    const double error = (colours(back).select(1, channel) - values).square().mean().item<double>(),
+                 most = (plain - values).square().mean().item<double>();
+    std::printf("channel %d: mean squared error %.3g, of max |s| / 127 %.3g\n", int(channel), error,
+                most);
+    EXPECT_LE(error, most * (1 + 1e-5));
+    EXPECT_EQ(error == 0, channel == 1);
+  }
+  StaticPart other = part;
+  other.groups.pop_back();
+  EXPECT_THROW(take_static_part(other, layout, back), InputError);
+  other = part;
+  other.groups[1].grid_size = 16;
+  EXPECT_THROW(take_static_part(other, layout, back), InputError);
+}
+
 TEST(Training, OfAFinishedRunHasNothingToResume) {
   const TemporaryFolder folder;
   TrainRequest once = request(folder.path("run"), 5);
@@ -287,6 +468,15 @@ TEST(TrainingInput, IsRefusedWithOneClearLine) {
   bad = request(folder.path("run"), 5);
   bad.settings.init = folder.path("no_weights");
   EXPECT_NE(error_of(bad).find("no_weights"), std::string::npos) << error_of(bad);
+  bad = request(folder.path("run"), 5);
+  bad.settings.network_size = 20;
+  EXPECT_NE(error_of(bad).find("network_size"), std::string::npos) << error_of(bad);
+  bad = request(folder.path("run"), 5);
+  bad.settings.network = false;
+  EXPECT_NE(error_of(bad).find("static_grids"), std::string::npos) << error_of(bad);
+  bad = request(folder.path("run"), 5);
+  bad.settings.static_grids = parse_static_grids("all:T,colour:T/2", "test");
+  EXPECT_NE(error_of(bad).find("two groups"), std::string::npos) << error_of(bad);
   bad = request(folder.path("absent"), 5);
   bad.resume = true;
   EXPECT_NE(error_of(bad).find("no run to resume"), std::string::npos) << error_of(bad);
