@@ -167,7 +167,7 @@ TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritte
 }
 
 TEST_F(RunDirectoryTest, StaticGridsAreRefusedByName) {
-  const auto error = [](const std::string& text) {
+  const auto refusal = [](const std::string& text) {
     try {
       parse_static_grids(text, "--static-grids");
     } catch (const InputError& error) {
@@ -175,10 +175,10 @@ TEST_F(RunDirectoryTest, StaticGridsAreRefusedByName) {
     }
     return std::string();
   };
-  EXPECT_NE(error("hair:T").find("\"hair\""), std::string::npos) << error("hair:T");
-  EXPECT_NE(error("all:T/3").find("\"T/3\""), std::string::npos) << error("all:T/3");
-  EXPECT_NE(error("").find("static_grids"), std::string::npos) << error("");
-  EXPECT_NE(error("all:T,").find("static_grids"), std::string::npos) << error("all:T,");
+  EXPECT_NE(refusal("hair:T").find("\"hair\""), std::string::npos) << refusal("hair:T");
+  EXPECT_NE(refusal("all:T/3").find("\"T/3\""), std::string::npos) << refusal("all:T/3");
+  EXPECT_NE(refusal("").find("static_grids"), std::string::npos) << refusal("");
+  EXPECT_NE(refusal("all:T,").find("static_grids"), std::string::npos) << refusal("all:T,");
   EXPECT_TRUE(parse_static_grids("none", "test").empty());
 }
 

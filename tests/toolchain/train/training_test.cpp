@@ -281,6 +281,32 @@ TEST(Training, FromAnotherRunTakesItsStaticPartOrTheNetworkAlone) {
   EXPECT_NE(error_of(finer).find("static.0"), std::string::npos) << error_of(finer);
 }
 
+TEST(Training, OfBothPartsIsPackedWithTheNetworksGridAndRoundedValues) {
+  const TemporaryFolder folder;
+  TrainRequest both = both_parts(folder.path("run"), 20);
+  both.settings.static_grids = parse_static_grids("colour:T,rest:T/2", "test");
+  train_avatar(both);
+  TrainedAvatar avatar = TrainedAvatar::open({.run = both.run});
+  const torch::Tensor own = avatar.model().statics().values.clone();
+  const AlignedBytes bytes(pack_avatar(avatar, {both.run}, {}));
+  EXPECT_TRUE(torch::equal(avatar.model().statics().values, own)) << "packing changed the run";
+  const Package package = value_or_throw(Package::open(bytes.bytes(), "package"), "package");
+  const Avatar& packed = package.avatar();
+  EXPECT_EQ(packed.network.input_size, 16u);
+  EXPECT_EQ(packed.texels_a_side(), 32u);
+  EXPECT_FALSE(packed.golden.png.empty());
+  ASSERT_EQ(packed.static_part.groups.size(), 2u);
+  EXPECT_TRUE(validate_static_part(packed.static_part, avatar.body()).ok());
+  StaticMap& map = avatar.model().statics();
+  take_static_part(packed.static_part, head_layout(both.settings), map);
+  float largest_scale = 0;
+  for (const StaticGroup& group : packed.static_part.groups) {
+    for (const float scale : group.scale) largest_scale = std::max(largest_scale, scale);
+  }
+  EXPECT_GT(map.values.abs().max().item<float>(), 20 * largest_scale);
+  EXPECT_LT((map.values - own).square().mean().sqrt().item<float>(), largest_scale);
+}
+
 TEST(Training, WithStaticColoursAsASumIsRefusedByPack) {
   const TemporaryFolder folder;
   TrainRequest sum = both_parts(folder.path("run"), 3);
