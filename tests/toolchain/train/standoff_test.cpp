@@ -151,8 +151,7 @@ TEST(Standoff, OffsetsTakeTheGradientThroughTheSkinningAndOthersNone) {
   const PosedBody posed = model.pose(model.from_capture(data.frames()[3]).view());
   const model::HeadFrame frame = model.head_frame(posed);
   const uint32_t channels = head_channels(0);
-  std::vector<float> head(size_t(body.texel_count()) * channels, 0.0f), ours = head,
-                                                                                 theirs = head;
+  std::vector<float> head(size_t(body.texel_count()) * channels, 0.0f), ours = head, theirs = head;
   // The head's own backward pass, told of position gradients alone, is the reference.
   model::GaussianBuffer<float> gradients;
   gradients.resize(body.texel_count(), 0);
