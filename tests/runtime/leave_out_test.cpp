@@ -76,7 +76,8 @@ constexpr LeaveOut kNothing{.hidden_texels = false,
                             .transparent = false,
                             .outside = false,
                             .missed_tiles = false,
-                            .stopped = false};
+                            .stopped = false,
+                            .unchanged_networks = false};
 
 TEST_P(LeaveOutScene, EverySwitchIsExactAndCounted) {
   const Drawn all = draw({}), none = draw(kNothing);
