@@ -10,12 +10,6 @@ namespace figurine::measure {
 
 namespace {
 
-constexpr uint8_t kForegroundAlpha = 127;  // 127/255 < 0.5 < 128/255
-
-bool is_foreground(const Picture& truth, size_t pixel) {
-  return truth.rgba[4 * pixel + 3] > kForegroundAlpha;
-}
-
 void check_sizes(const Picture& a, const Picture& b) {
   FIG_CHECK(
       a.width_px == b.width_px && a.height_px == b.height_px && a.rgba.size() == b.rgba.size(),

@@ -17,13 +17,13 @@ inline constexpr uint32_t kMaxGridStep = 8;  // T / G
 // A square grid of G x G cells over the map of T x T texels, T / G = 1, 2, 4 or 8 texels a cell and
 // side. A cell is covered where one of its texels is.
 struct TexelGrid {
-  uint32_t size = 0;                 // G
-  std::vector<uint32_t> cell;        // [M] v * G + u, strictly ascending
-  std::vector<uint32_t> source;      // [M] row in [0,N) of the texel that the cell stands for: the
-                                     // covered one nearest to its centre, of equals the first
-  std::vector<uint32_t> border_cell;    // [B] ascending; the two rings around the covered cells
-  std::vector<uint32_t> border_source;  // [B] row in [0,M) of the nearest covered cell, of equals the
-                                        // first; for G = T the body's own
+  uint32_t size = 0;                  // G
+  std::vector<uint32_t> cell;         // [M] v * G + u, strictly ascending
+  std::vector<uint32_t> source;       // [M] row in [0,N) of the texel that the cell stands for: the
+                                      // covered one nearest to its centre, of equals the first
+  std::vector<uint32_t> border_cell;  // [B] ascending; the two rings around the covered cells
+  std::vector<uint32_t> border_source;  // [B] row in [0,M) of the nearest covered cell, of equals
+                                        // the first; for G = T the body's own
 
   uint32_t cell_count() const { return static_cast<uint32_t>(cell.size()); }
 };

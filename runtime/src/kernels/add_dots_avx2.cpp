@@ -32,10 +32,10 @@ void add_eight(const int16_t* shared, const int16_t* rows, uint64_t length, int3
       s[i] = _mm256_add_epi32(s[i], _mm256_madd_epi16(a, row));
     }
   }
-  const __m256i first = _mm256_hadd_epi32(_mm256_hadd_epi32(s[0], s[1]),
-                                          _mm256_hadd_epi32(s[2], s[3])),
-                last = _mm256_hadd_epi32(_mm256_hadd_epi32(s[4], s[5]),
-                                         _mm256_hadd_epi32(s[6], s[7]));
+  const __m256i first =
+                    _mm256_hadd_epi32(_mm256_hadd_epi32(s[0], s[1]), _mm256_hadd_epi32(s[2], s[3])),
+                last =
+                    _mm256_hadd_epi32(_mm256_hadd_epi32(s[4], s[5]), _mm256_hadd_epi32(s[6], s[7]));
   const __m256i added = _mm256_add_epi32(_mm256_permute2x128_si256(first, last, 0x20),
                                          _mm256_permute2x128_si256(first, last, 0x31));
   __m256i* to = reinterpret_cast<__m256i*>(sums);
