@@ -13,6 +13,7 @@
 #include "figurine/camera.h"
 #include "figurine/fixed_point.h"
 #include "figurine/network.h"
+#include "figurine/status.h"
 
 namespace figurine {
 
@@ -73,6 +74,17 @@ struct StaticPart {
 // In units of SH degree 0's coefficient: the half that splatting adds to a colour.
 inline constexpr float kHalfColour = 1.7724538509f;  // 0.5 / 0.28209479 = sqrt(pi)
 
+// Bounds of |scale[c] * q|: far beyond what a person needs, and e^s and every sum stay finite.
+inline constexpr float kMaxStaticValue = 1000;
+inline constexpr float kMaxStaticLogGain = 20;  // of a colour
+
+// Everything that makes the equations above defined over texels of uv_size a side: channels within
+// kStaticChannels and in one group each, grids that fit, rows of `channels` values, none -128,
+// scales positive, normal and within the bounds. kCorrupt "static part: group G: ...".
+Status validate_static_part(const StaticPart& part, uint32_t uv_size);
+// The same, and one row of values for every cell that the body covers.
+Status validate_static_part(const StaticPart& part, const Body& body);
+
 // In which arithmetic a network is evaluated.
 enum class Precision : uint8_t { kFloat32, kFixedPoint };
 const char* to_string(Precision precision);  // "f32", "q8"
@@ -128,17 +140,22 @@ struct AvatarTraits {
 };
 
 // The network's float weights may be absent if fixed_point is there. The network may run on a grid
-// coarser than the body's texels (network.input_size; figurine/texel_grid.h), and there may be none
-// (no layers): then there is a static part.
+// coarser than the body's texels (network.input_size < uv_size; figurine/texel_grid.h), and there
+// may be none (no layers, input_size, input_channels and fourier_octaves 0): then there is a static
+// part.
 struct Avatar : AvatarKind, AvatarTraits {
   std::string name;
+  uint32_t uv_size = 0;           // T of the body; 0: that of the network, texels_a_side() says it
   std::span<const float> shape;   // [<= S]
   FixedPointNetwork fixed_point;  // empty if the package has none
   StaticPart static_part;         // empty if the package has none
   PoseStatistics pose_statistics;
 
-  // A package holds one or both.
+  bool has_network() const { return !network.layers.empty(); }
+  uint32_t texels_a_side() const { return uv_size != 0 ? uv_size : network.input_size; }  // T
+  // A package holds one or both; both where there is no network to evaluate.
   bool holds(Precision precision) const {
+    if (!has_network()) return true;
     return precision == Precision::kFixedPoint ? !fixed_point.empty() : has_weights(network);
   }
 };
