@@ -40,8 +40,8 @@ class BodyGrid {
   }
   // Which blocks of cells a block of texels has taps in, ascending; of_texels: itself.
   std::span<const uint32_t> cell_blocks_of(size_t block) const {
-    return tapped_.span(tapped_count_).subspan(first_tapped_[block],
-                                               first_tapped_[block + 1] - first_tapped_[block]);
+    return tapped_.span(tapped_count_)
+        .subspan(first_tapped_[block], first_tapped_[block + 1] - first_tapped_[block]);
   }
 
   uint64_t memory_bytes() const;

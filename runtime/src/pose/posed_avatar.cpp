@@ -29,7 +29,7 @@ Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, c
   std::unique_ptr<PosedAvatar> posed(
       new (std::nothrow) PosedAvatar(avatar, body, blocks, precision, pool, kernels));
   if (posed == nullptr) return out_of_memory("an avatar");
-  if (!avatar.network.layers.empty()) {
+  if (avatar.has_network()) {
     FIG_RETURN_IF_ERROR(posed->prepare_network(avatar, std::move(grid)));
   } else if (avatar.static_part.empty()) {
     return Status(StatusCode::kCorrupt, "avatar: neither a network nor a static part");
@@ -127,7 +127,8 @@ NetworkUse PosedAvatar::choose_use(const PoseJob& job, const PoseScratch& scratc
   if (network_ == nullptr || scratch.wanted_count == 0) return NetworkUse::kNone;
   if (!last_run_.done) return NetworkUse::kRun;
   if (job.leave_out.unchanged_networks && is_last_pose(job.pose)) return NetworkUse::kUnchanged;
-  const bool stale = job.avatar == last_run_.avatar && is_small(job, scratch.transforms);
+  const bool stale =
+      job.avatar && job.avatar == last_run_.avatar && is_small(job, scratch.transforms);
   return stale ? NetworkUse::kStale : NetworkUse::kRun;
 }
 

@@ -14,6 +14,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "figurine/avatar.h"
@@ -48,8 +49,10 @@ struct PoseScratch {
 
 // A pose and what is wanted of it.
 struct PoseJob {
-  PoseView pose;                        // must be valid for the body
-  AvatarId avatar{};                    // whose: equal ones share a PosedAvatar
+  PoseView pose;  // must be valid for the body
+  // Whose it is, equal avatars sharing a PosedAvatar. None: that of no frame, which no later pose
+  // keeps anything of that is not exact.
+  std::optional<AvatarId> avatar;
   const kernels::View* view = nullptr;  // null: all texels are wanted
   LeaveOut leave_out;
   Approximation approximation;
@@ -66,9 +69,9 @@ enum class NetworkUse : uint8_t {
 class PosedAvatar {
  public:
   // The arrays behind avatar and body are borrowed and must outlive the object, as must blocks,
-  // which are the body's. grid: the network's over the body if another avatar has it, otherwise
-  // null. Errors: AvatarNetwork::create's; kCorrupt if shape, grids or static part do not fit the
-  // body; kOutOfMemory.
+  // which are the body's. The static part must fit the body (validate_static_part). grid: the
+  // network's over the body if another avatar has it, otherwise null. Errors:
+  // AvatarNetwork::create's; kCorrupt if shape or grid do not fit the body; kOutOfMemory.
   static Result<std::unique_ptr<PosedAvatar>> create(const Avatar& avatar, const Body& body,
                                                      const BodyBlocks& blocks,
                                                      std::shared_ptr<const BodyGrid> grid,
@@ -117,7 +120,7 @@ class PosedAvatar {
   // Which pose the network's last run was for.
   struct LastRun {
     bool done = false;
-    AvatarId avatar{};
+    std::optional<AvatarId> avatar;
     std::array<float, 3> root_translation_m{};
     Buffer<float> rotations;  // [J,4]
   };
