@@ -35,11 +35,8 @@ struct RandomStaticPart {
       value = static_cast<int8_t>(static_cast<int>(random.uniform(0, 255)) - 127);
     std::vector<float>& s = scales.emplace_back(channels);
     for (float& value : s) value = scale * random.uniform(0.5f, 1.5f);
-    part.groups.push_back({.first_channel = first,
-                           .channels = channels,
-                           .grid_size = size,
-                           .values = q,
-                           .scale = s});
+    part.groups.push_back(
+        {.first_channel = first, .channels = channels, .grid_size = size, .values = q, .scale = s});
   }
 };
 
