@@ -81,6 +81,22 @@ nlohmann::json to_json(const Group& group) {
           {"uncovered_share", group.outline.uncovered_share()}};
 }
 
+// Images of the same role, told apart by how much of the person they hold.
+struct Framed {
+  Group body, bust;
+  Group& of(dataset::Framing framing) { return framing == dataset::Framing::kBust ? bust : body; }
+};
+
+// The same figures of close-ups have "bust_" before their names; none where there are no such
+// images.
+nlohmann::json to_json(const Framed& framed) {
+  nlohmann::json report = to_json(framed.body);
+  if (framed.bust.images == 0) return report;
+  const nlohmann::json bust = to_json(framed.bust);
+  for (const auto& [name, value] : bust.items()) report["bust_" + name] = value;
+  return report;
+}
+
 // The groups that an image of this role counts for.
 std::vector<std::string> groups_of(dataset::Role role) {
   switch (role) {
@@ -104,7 +120,7 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
                                        const ReconstructionOptions& options) {
   const dataset::Dataset& data = avatar.data();
   const size_t cameras = data.cameras().size(), frames = data.frames().size();
-  std::map<std::string, Group> groups;
+  std::map<std::string, Framed> groups;
   SquaredError difference;
   // Per camera the picture of the block frame before, for the frame differences.
   struct Before {
@@ -126,12 +142,14 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
       if (interrupt.requested()) throw train::Interrupted("evaluate: stopped; nothing was written");
       if (!posed) posed = pose_frame(avatar, frame);
       const Camera& view = data.cameras()[camera].camera;
+      const dataset::Framing framing = data.cameras()[camera].framing;
       const Picture prediction = render_picture(avatar, *posed, view);
       const Picture truth = true_picture(data, frame, camera);
       const Box head_box =
           projected_box(avatar.model(), posed->posed, view, head_joints(), kHeadEnlarge);
-      for (const std::string& name : groups_of(role)) groups[name].add(prediction, truth, head_box);
-      if (split == dataset::FrameSplit::kBlock) {
+      for (const std::string& group : groups_of(role))
+        groups[group].of(framing).add(prediction, truth, head_box);
+      if (split == dataset::FrameSplit::kBlock && framing == dataset::Framing::kBody) {
         std::optional<Before>& last = before[camera];
         if (last && last->frame + 1 == frame)
           difference.add(difference_error(last->prediction, prediction, last->truth, truth));
@@ -157,8 +175,9 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
       "energy of (picture - 3x3 mean) "
       "inside the mask, "
       "prediction over truth, and its correlation with the truth's; filled: alpha of at least 0.98 "
-      "where the truth has it, 3 pixels inside the mask; difference: PSNR of consecutive frames' "
-      "differences in the held-out "
+      "where the truth has it, 3 pixels inside the mask; bust: the same of the cameras of head and "
+      "shoulders, which count nowhere else; difference: PSNR of consecutive frames' differences in "
+      "the held-out "
       "block";
   return report;
 }
