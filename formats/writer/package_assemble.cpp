@@ -106,6 +106,15 @@ Offset<schema::PoseStatistics> build_pose_statistics(FlatBufferBuilder& b,
              : schema::CreatePoseStatistics(b, b.CreateVector(statistics.joints));
 }
 
+// No empty list, so that an avatar without a static part has the bytes that it always had.
+Offset<flatbuffers::Vector<Offset<schema::StaticGroup>>> build_static_groups(
+    FlatBufferBuilder& b, const StaticPart& part) {
+  if (part.empty()) return 0;
+  return build_list(b, part.groups, [&](const StaticGroup& group) {
+    return schema::CreateStaticGroup(b, group.first_channel, group.grid_size);
+  });
+}
+
 Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
   const auto body_name = b.CreateString(avatar.body_name), preset = b.CreateString(avatar.preset);
   const schema::MapStatistics statistics = build_map_statistics(avatar.map_statistics);
@@ -114,10 +123,12 @@ Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
   const auto pose_statistics = build_pose_statistics(b, avatar.pose_statistics);
   const auto golden = build_golden(b, avatar.golden);
   const auto fixed_point = build_fixed_point(b, avatar.fixed_point);
+  const auto static_groups = build_static_groups(b, avatar.static_part);
+  const uint32_t uv_size = avatar.texels_a_side() != avatar.network.input_size ? avatar.uv_size : 0;
   return schema::CreateAvatar(b, body_name, avatar.body_hash[0], avatar.body_hash[1], preset,
                               static_cast<schema::TemplateMode>(avatar.template_mode), &statistics,
                               avatar.fourier_octaves, decoding, network, pose_statistics, golden,
-                              fixed_point)
+                              fixed_point, static_groups, uv_size)
       .Union();
 }
 

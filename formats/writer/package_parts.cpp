@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "figurine/detail/rans.h"
+#include "formats/src/package/layout.h"
 
 namespace figurine {
 
@@ -82,6 +83,32 @@ void add_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& shapes
   }
 }
 
+void add_static_part(const StaticPart& part, PartList& list) {
+  for (size_t g = 0; g < part.groups.size(); ++g) {
+    const StaticGroup& group = part.groups[g];
+    const std::string name = "static." + std::to_string(g);
+    list.add(name + ".values", group.values, {group.channels});
+    list.add(name + ".scale", group.scale, {}, group.channels);
+  }
+}
+
+// kInvalidArgument if the network's weights do not have its shapes. None makes no blobs.
+Status add_network(const Avatar& avatar, PackageParts& parts, PartList& list) {
+  if (!avatar.has_network()) return {};
+  // The list's shapes say how the weights are laid out; their number is checked against them here,
+  // their values by the reader.
+  const bool has_floats = avatar.holds(Precision::kFloat32) || avatar.fixed_point.empty();
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, has_floats);
+  if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
+  if (has_floats) add_float_weights("network", avatar.network, *shapes, list);
+  if (avatar.fixed_point.empty()) return {};
+  if (avatar.fixed_point.convolutions.size() != avatar.network.layers.size())
+    return Status(StatusCode::kInvalidArgument, "avatar.fixed_point: not one entry per layer");
+  parts.required_features |= kFeatureFixedPoint;
+  add_fixed_point(avatar, *shapes, list);
+  return {};
+}
+
 void add_pose_statistics(const PoseStatistics& statistics, PartList& list) {
   const size_t features = statistics.joints.size() * 3;
   if (features == 0) return;
@@ -116,21 +143,11 @@ Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget,
                                 const Provenance& provenance) {
   PackageParts parts{
       .kind = PackageKind::kAvatar, .content = &avatar, .budget = budget, .provenance = provenance};
-  // The list's shapes say how the weights are laid out; their number is checked against them here,
-  // their values by the reader.
-  const bool has_floats = avatar.holds(Precision::kFloat32) || avatar.fixed_point.empty();
-  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, has_floats);
-  if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
   PartList list(parts.blobs);
   list.add("avatar.shape", avatar.shape);
-  if (has_floats) add_float_weights("network", avatar.network, *shapes, list);
-  if (!avatar.fixed_point.empty()) {
-    parts.required_features |= kFeatureFixedPoint;
-    if (avatar.fixed_point.convolutions.size() != avatar.network.layers.size()) {
-      return Status(StatusCode::kInvalidArgument, "avatar.fixed_point: not one entry per layer");
-    }
-    add_fixed_point(avatar, *shapes, list);
-  }
+  FIG_RETURN_IF_ERROR(add_network(avatar, parts, list));
+  add_static_part(avatar.static_part, list);
+  if (layout::needs_static_feature(avatar)) parts.required_features |= kFeatureStaticPart;
   if (avatar.decoding.max_offset != 0) parts.required_features |= kFeatureBoundedOffsets;
   add_pose_statistics(avatar.pose_statistics, list);
   list.add("golden.rotations", avatar.golden.rotations, {4});

@@ -29,6 +29,10 @@ bool same_shape(const Network& a, const Network& b) {
 Status check_alike(const NewMember& member, const NewPopulation& population) {
   const Avatar &own = *member.avatar, &first = *population.members.front().avatar;
   const std::string of_first = ", '" + first.name + "' has ";
+  if (!own.static_part.empty() || own.texels_a_side() != own.network.input_size)
+    return mismatch(member,
+                    "has a static part, or a network coarser than its texels: a population "
+                    "does not hold them");
   if (!own.holds(Precision::kFloat32))
     return mismatch(member, "holds no float weights (figurine-train pack --precision f32)");
   if (own.body_hash != first.body_hash) {

@@ -223,7 +223,8 @@ typedef struct fig_sampled {
 } fig_sampled;
 
 /* Threads that several renderers share: 1 to 64, the caller's own counted, and no more than there
- * are CPUs. */
+ * are CPUs. Networks run on the caller's alone in a process that had loaded XNNPACK before this
+ * library (docs/embedding.md, "Threads"). */
 FIG_API fig_status fig_threads_create(uint32_t threads, fig_threads* created);
 /* FIG_INVALID_ARGUMENT while a renderer uses them. */
 FIG_API fig_status fig_threads_destroy(fig_threads threads);

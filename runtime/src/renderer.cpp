@@ -199,6 +199,10 @@ Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
     return Status(StatusCode::kMismatch,
                   std::string("a body is wanted, not a ") + to_string(body.kind()));
   FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar, body));
+  if (!avatar.static_part.empty() || avatar.texels_a_side() != avatar.network.input_size) {
+    return Status(StatusCode::kUnsupported,
+                  "avatar: a static part, or a network coarser than the texels, is not drawn yet");
+  }
   if (impl_->next_id == std::numeric_limits<uint32_t>::max())
     return Status(StatusCode::kLimitExceeded, "avatars: no further id");
   const Result<std::shared_ptr<Impl::SharedBody>> shared = impl_->blocks_of(body.body());

@@ -22,6 +22,14 @@ std::string isa_names() {
   return names;
 }
 
+nlohmann::ordered_json machine(uint32_t threads, const std::string& precision, const char* isa) {
+  return {{"cpu", cpu_name()},
+          {"cpus", ports::usable_cpus()},
+          {"threads", threads},
+          {"precision", precision},
+          {"isa", isa}};
+}
+
 }  // namespace
 
 void DeviceOptions::add_to(CLI::App& app, bool json_flag) {
@@ -32,9 +40,7 @@ void DeviceOptions::add_to(CLI::App& app, bool json_flag) {
   app.add_option(
       "--precision", precision,
       "arithmetic of the network: f32, or q8 (fixed point); default: q8 where the package has it");
-  app.add_option("--isa", isa,
-                 "instruction set of figurine's own kernels, the same pixels with each: " +
-                     isa_names() + "; default: FIGURINE_ISA, else the last");
+  add_isa_option(app, isa);
   if (json_flag) app.add_flag("--json", json, "print a summary as JSON to standard output");
 }
 
@@ -56,7 +62,15 @@ Result<RendererOptions> DeviceOptions::renderer_options() const {
                          .isa = *kernels};
 }
 
-Result<Isa> DeviceOptions::instruction_set() const {
+Result<Isa> DeviceOptions::instruction_set() const { return samples::instruction_set(isa); }
+
+void add_isa_option(CLI::App& app, std::string& isa) {
+  app.add_option("--isa", isa,
+                 "instruction set of figurine's own kernels, the same bits with each: " +
+                     isa_names() + "; default: FIGURINE_ISA, else the last");
+}
+
+Result<Isa> instruction_set(const std::string& isa) {
   const char* const environment = std::getenv("FIGURINE_ISA");
   const std::string name = !isa.empty() ? isa : (environment != nullptr ? environment : "");
   if (name.empty()) return supported_isas().back();
@@ -94,11 +108,11 @@ nlohmann::ordered_json json_header(const char* command) {
 nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threads,
                                     const std::string& precision) {
   const Result<Isa> isa = options.instruction_set();  // renderer_options() has looked at it
-  return {{"cpu", cpu_name()},
-          {"cpus", ports::usable_cpus()},
-          {"threads", threads},
-          {"precision", precision},
-          {"isa", isa.ok() ? to_string(*isa) : "none"}};
+  return machine(threads, precision, isa.ok() ? to_string(*isa) : "none");
+}
+
+nlohmann::ordered_json json_sampling_machine(Isa isa) {
+  return machine(1, to_string(Precision::kFixedPoint), to_string(isa));
 }
 
 void print_json(const nlohmann::ordered_json& json) {

@@ -30,9 +30,14 @@ struct DeviceOptions {
   Result<RendererOptions> renderer_options() const;
   // As asked for; without, the renderer's own choice. renderer_options() has looked at it.
   std::optional<Precision> network_precision() const;
-  // Of our own kernels: the same pixels with every one. kUnsupported for what is not there.
   Result<Isa> instruction_set() const;
 };
+
+// --isa alone, for a command that has no other of the options above.
+void add_isa_option(CLI::App& app, std::string& isa);
+// The instruction set of our own kernels that --isa (empty: not given) and the environment ask for:
+// the same bits with every one. kUnsupported for what is not there.
+Result<Isa> instruction_set(const std::string& isa);
 
 // Renderer::create, with a line on standard error where the system gives fewer threads than asked
 // for.
@@ -43,6 +48,8 @@ nlohmann::ordered_json json_header(const char* command);
 // CPU, usable CPUs, threads in use, precision of the networks that ran, and kernels.
 nlohmann::ordered_json json_machine(const DeviceOptions& options, uint32_t threads,
                                     const std::string& precision);
+// The same of a command that samples weights: one thread, integers.
+nlohmann::ordered_json json_sampling_machine(Isa isa);
 void print_json(const nlohmann::ordered_json& json);
 
 }  // namespace figurine::samples

@@ -309,7 +309,10 @@ Status run_report(const ReportOptions& options) {
   // Whatever else it is, or is not, is said by what loads an avatar.
   if (const auto loaded = load_package(options.scene.avatars[0]);
       loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
+    const Result<Isa> isa = options.device.instruction_set();
+    if (!isa.ok()) return isa.status();
     return run_sampler_report(**loaded, {.body = options.scene.body,
+                                         .isa = *isa,
                                          .seeds = options.seeds,
                                          .output = options.output,
                                          .json = options.device.json});

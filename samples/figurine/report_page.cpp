@@ -58,7 +58,7 @@ tr.default td { color: var(--accent); font-weight: 600; }
 .pictures img { width: 100%; display: block; border-radius: 4px; }
 )css";
 
-std::string format(const char* pattern, double value) {
+std::string formatted(const char* pattern, double value) {
   char text[64];
   std::snprintf(text, sizeof(text), pattern, value);
   return text;
@@ -121,7 +121,7 @@ std::string plots_of(const Json& dial) {
       const double p = dial["theoretical_order"], v = setting["value"], e = setting["rmse"];
       order.lines.push_back({{v / 8, e / std::pow(8, p), "", false},
                              {v * 8, e * std::pow(8, p), "", false},
-                             "order " + format("%g", p)});
+                             "order " + formatted("%g", p)});
     }
   }
   const auto figure = [](const Plot& plot, const std::string& caption) {
@@ -139,10 +139,10 @@ std::string plots_of(const Json& dial) {
                 "the default.") +
          "<div class=\"words\"><p><b>In theory.</b> " +
          escape_html(dial["theory"].get<std::string>()) + " Order " +
-         format("%g", dial["theoretical_order"]) + ".</p><p><b>Observed.</b> " +
+         formatted("%g", dial["theoretical_order"]) + ".</p><p><b>Observed.</b> " +
          (dial["observed_order"].is_null()
               ? "No error to speak of."
-              : "Order " + format("%.2f", dial["observed_order"]) + ", over " +
+              : "Order " + formatted("%.2f", dial["observed_order"]) + ", over " +
                     escape_html(dial["observed_over"].get<std::string>()) + ".") +
          "</p></div>" + "</div>\n";
 }
@@ -159,17 +159,17 @@ std::string table_of(const Json& dial) {
     html += setting["default"].get<bool>() ? "<tr class=\"default\">" : "<tr>";
     html += cell(escape_html(setting["label"].get<std::string>()) +
                  (setting["default"].get<bool>() ? " (default)" : ""));
-    html += cell(setting["psnr_db"].is_null() ? "equal" : format("%.2f", setting["psnr_db"]));
-    html += cell(format("%.2e", setting["rmse"])) + cell(format("%.2e", setting["largest"]));
-    html +=
-        cell(setting["observed_order"].is_null() ? "" : format("%.2f", setting["observed_order"]));
+    html += cell(setting["psnr_db"].is_null() ? "equal" : formatted("%.2f", setting["psnr_db"]));
+    html += cell(formatted("%.2e", setting["rmse"])) + cell(formatted("%.2e", setting["largest"]));
+    html += cell(
+        setting["observed_order"].is_null() ? "" : formatted("%.2f", setting["observed_order"]));
     const Json& cost = setting["cost_ms"];
-    html += cell(format("%.2f", cost["median"])) + cell(format("%.2f", cost["p90"]));
+    html += cell(formatted("%.2f", cost["median"])) + cell(formatted("%.2f", cost["p90"]));
     if (of_frames) {
-      html += cell(format("%.2f", setting["stages_ms"]["total"]["median"]));
-      html += cell(format("%.0f", work["blends"])) + cell(format("%.0f", work["pairs"]));
+      html += cell(formatted("%.2f", setting["stages_ms"]["total"]["median"]));
+      html += cell(formatted("%.0f", work["blends"])) + cell(formatted("%.0f", work["pairs"]));
     }
-    html += cell(format("%.3f", work["macs"].get<double>() * 1e-9));
+    html += cell(formatted("%.3f", work["macs"].get<double>() * 1e-9));
     html += "</tr>\n";
   }
   return html + "</table>\n";

@@ -11,7 +11,6 @@
 #include "figurine/renderer.h"
 #include "formats/writer/package_writer.h"
 #include "ports/host/clock.h"
-#include "ports/host/cpus.h"
 #include "ports/host/files.h"
 #include "samples/common/device_options.h"
 #include "samples/common/file_sink.h"
@@ -27,10 +26,11 @@ namespace figurine::samples {
 namespace {
 
 struct SampleOptions {
-  std::string sampler, body, precision = "q8", solver, name, output, trace;
+  std::string sampler, body, precision = "q8", solver, name, output, trace, isa;
   SampleRequest request;
   std::optional<uint64_t> to;
   std::optional<double> mix;
+  Isa kernels = Isa::kBaseline;  // that --isa and the environment ask for
   bool json = false;
 };
 
@@ -40,8 +40,9 @@ struct GoldenPicture {
   uint64_t memory_bytes = 0;  // of the renderer
 };
 
-Result<GoldenPicture> draw(const Avatar& avatar, const Package& body, Precision precision) {
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1});
+Result<GoldenPicture> draw(const Avatar& avatar, const Package& body, Precision precision,
+                           Isa isa) {
+  Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1, .isa = isa});
   if (!renderer.ok()) return renderer.status();
   const Result<AvatarId> id = (*renderer)->add_avatar(avatar, body, precision);
   if (!id.ok()) return id.status();
@@ -62,7 +63,7 @@ Result<GoldenPicture> draw(const Avatar& avatar, const Package& body, Precision 
 class Strip final : public AvatarSampler::Trace {
  public:
   static Result<std::unique_ptr<Strip>> create(const std::string& folder, const Sampler& sampler,
-                                               const Package& body, uint32_t steps) {
+                                               const Package& body, uint32_t steps, Isa isa) {
     std::error_code error;
     std::filesystem::create_directories(folder, error);
     if (error) return Status(StatusCode::kIo, folder + ": cannot be created: " + error.message());
@@ -73,12 +74,14 @@ class Strip final : public AvatarSampler::Trace {
     Result<ContactSheet> sheet = ContactSheet::create(
         {.frame_size = size, .frame_count = steps, .columns = 10, .tiles = 10});
     if (!sheet.ok()) return sheet.status();
-    return std::unique_ptr<Strip>(new Strip(folder, body, std::move(*sink), std::move(*sheet)));
+    return std::unique_ptr<Strip>(
+        new Strip(folder, body, isa, std::move(*sink), std::move(*sheet)));
   }
 
   Status after_step(uint32_t step, double, const SampledAvatar& avatar) override {
     FIG_RETURN_IF_ERROR(check_interrupt());
-    const Result<GoldenPicture> picture = draw(avatar.avatar(), *body_, Precision::kFixedPoint);
+    const Result<GoldenPicture> picture =
+        draw(avatar.avatar(), *body_, Precision::kFixedPoint, isa_);
     if (!picture.ok()) return picture.status();
     sheet_.offer(step - 1, picture->frame.u8);
     return sink_->add(picture->frame);
@@ -90,14 +93,17 @@ class Strip final : public AvatarSampler::Trace {
   }
 
  private:
-  Strip(std::string folder, const Package& body, std::unique_ptr<FileSink> sink, ContactSheet sheet)
+  Strip(std::string folder, const Package& body, Isa isa, std::unique_ptr<FileSink> sink,
+        ContactSheet sheet)
       : folder_(std::move(folder)),
         body_(&body),
+        isa_(isa),
         sink_(std::move(sink)),
         sheet_(std::move(sheet)) {}
 
   std::string folder_;
   const Package* body_;
+  Isa isa_;
   std::unique_ptr<FileSink> sink_;
   ContactSheet sheet_;
 };
@@ -137,7 +143,8 @@ std::string default_name(const Sampler& sampler, const SampleRequest& request) {
 Result<std::vector<std::byte>> pack(const SampleOptions& options, const LoadedPackage& sampler,
                                     const Package& body, Avatar avatar) {
   const Result<GoldenPicture> picture =
-      draw(avatar, body, options.precision == "f32" ? Precision::kFloat32 : Precision::kFixedPoint);
+      draw(avatar, body, options.precision == "f32" ? Precision::kFloat32 : Precision::kFixedPoint,
+           options.kernels);
   if (!picture.ok()) return picture.status();
   if (options.precision != "f32") {
     avatar.golden.fixed_point_hash = hash_picture(picture->frame.u8.pixels);
@@ -171,19 +178,58 @@ Result<SampleRequest> checked_request(const SampleOptions& options) {
   return request;
 }
 
+// What a sampling came to.
+struct Sampled {
+  std::string name;
+  std::array<uint64_t, 2> hash;  // of the weights
+  uint64_t size_bytes = 0;
+  double open_s = 0, sample_s = 0;
+  uint64_t peak_bytes = 0;  // of the process when the weights were there, the package's mapped
+                            // pages included
+};
+
+void print_summary(const SampleOptions& options, const Sampler& from, const AvatarSampler& sampler,
+                   const Sampled& sampled) {
+  const uint32_t evaluations = steps_of(options.request, from);
+  if (!options.json) {
+    std::fprintf(stderr, "%s: %s, %u evaluations in %.2f s, weights %s\n", options.output.c_str(),
+                 sampled.name.c_str(), evaluations, sampled.sample_s,
+                 format_hash(sampled.hash).c_str());
+    return;
+  }
+  nlohmann::ordered_json json = json_header("sample");
+  json["sampler"] = options.sampler;
+  json["output"] = options.output;
+  json["seed"] = options.request.seed;
+  if (options.request.mix != 0) json["to"] = options.request.to, json["mix"] = options.request.mix;
+  json["solver"] = to_string(method_of(options.request, from));
+  json["evaluations"] = evaluations;
+  json["weights_hash"] = format_hash(sampled.hash);
+  json["size_bytes"] = sampled.size_bytes;
+  json["seconds"] = {{"open", sampled.open_s}, {"sample", sampled.sample_s}};
+  json["macs_per_evaluation"] = sampler.macs_per_evaluation();
+  json["sampler_memory_bytes"] = sampler.memory_bytes();
+  json["peak_memory_bytes"] = sampled.peak_bytes;
+  json["machine"] = json_sampling_machine(sampler.isa());
+  print_json(json);
+}
+
 Status run_sample(SampleOptions options) {
   if (!options.output.ends_with(".fgn"))
     return Status(StatusCode::kUnsupported, options.output + ": avatars are written as .fgn");
   const Result<SampleRequest> request = checked_request(options);
   if (!request.ok()) return request.status();
   options.request = *request;
+  const Result<Isa> isa = instruction_set(options.isa);
+  if (!isa.ok()) return isa.status();
+  options.kernels = *isa;
 
   const uint64_t start_ns = ports::now_ns();
   const Result<std::unique_ptr<LoadedPackage>> loaded =
       load_package(options.sampler, PackageKind::kSampler);
   if (!loaded.ok()) return loaded.status();
   const Sampler& from = (*loaded)->package.sampler();
-  const Result<std::unique_ptr<AvatarSampler>> sampler = AvatarSampler::create(from);
+  const Result<std::unique_ptr<AvatarSampler>> sampler = AvatarSampler::create(from, *isa);
   if (!sampler.ok()) return sampler.status().within(options.sampler);
   const uint64_t loaded_ns = ports::now_ns();
 
@@ -201,14 +247,13 @@ Status run_sample(SampleOptions options) {
   if (!options.trace.empty()) {
     const uint32_t steps = steps_of(options.request, from);
     Result<std::unique_ptr<Strip>> created =
-        Strip::create(options.trace, from, (*body)->package, steps);
+        Strip::create(options.trace, from, (*body)->package, steps, *isa);
     if (!created.ok()) return created.status();
     strip = std::move(*created);
     SampledAvatar again;  // the same person, watched
     FIG_RETURN_IF_ERROR(
         (*sampler)->sample(options.request, again, strip.get()).within(options.sampler));
   }
-  const std::array<uint64_t, 2> hash = hash_weights(avatar.fixed_point, avatar.shape);
   const Result<std::vector<std::byte>> bytes = pack(options, **loaded, (*body)->package, avatar);
   if (!bytes.ok()) return bytes.status().within(options.output);
   FIG_RETURN_IF_ERROR(check_interrupt());
@@ -218,31 +263,13 @@ Status run_sample(SampleOptions options) {
   const auto seconds = [](uint64_t from_ns, uint64_t to_ns) {
     return static_cast<double>(to_ns - from_ns) * 1e-9;
   };
-  const uint32_t evaluations = steps_of(options.request, from);
-  if (options.json) {
-    nlohmann::ordered_json json = json_header("sample");
-    json["sampler"] = options.sampler;
-    json["output"] = options.output;
-    json["seed"] = options.request.seed;
-    if (options.request.mix != 0)
-      json["to"] = options.request.to, json["mix"] = options.request.mix;
-    json["solver"] = to_string(method_of(options.request, from));
-    json["evaluations"] = evaluations;
-    json["weights_hash"] = format_hash(hash);
-    json["size_bytes"] = bytes->size();
-    json["seconds"] = {{"open", seconds(start_ns, loaded_ns)},
-                       {"sample", seconds(loaded_ns, sampled_ns)}};
-    json["macs_per_evaluation"] = (*sampler)->macs_per_evaluation();
-    json["sampler_memory_bytes"] = (*sampler)->memory_bytes();
-    json["peak_memory_bytes"] = peak_bytes;  // of the process when the weights were there, the
-                                             // package's mapped pages included
-    json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", ports::usable_cpus()}, {"threads", 1}};
-    print_json(json);
-  } else {
-    std::fprintf(stderr, "%s: %s, %u evaluations in %.2f s, weights %s\n", options.output.c_str(),
-                 avatar.name.c_str(), evaluations, seconds(loaded_ns, sampled_ns),
-                 format_hash(hash).c_str());
-  }
+  print_summary(options, from, **sampler,
+                {.name = avatar.name,
+                 .hash = hash_weights(avatar.fixed_point, avatar.shape),
+                 .size_bytes = bytes->size(),
+                 .open_s = seconds(start_ns, loaded_ns),
+                 .sample_s = seconds(loaded_ns, sampled_ns),
+                 .peak_bytes = peak_bytes});
   return {};
 }
 
@@ -281,6 +308,7 @@ Command add_sample_command(CLI::App& app) {
       "--trace", options->trace,
       "folder: a picture of the avatar after every step, and strip.png of ten of them");
   command->add_option("-o,--output", options->output, "avatar package to write (.fgn)")->required();
+  add_isa_option(*command, options->isa);
   command->add_flag("--json", options->json, "print a summary as JSON");
   return {command, [options] { return run_sample(*options); }};
 }

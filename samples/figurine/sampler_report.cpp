@@ -13,11 +13,9 @@
 #include "figurine/avatar_sampler.h"
 #include "figurine/renderer.h"
 #include "ports/host/clock.h"
-#include "ports/host/cpus.h"
 #include "ports/media/png.h"
 #include "samples/common/device_options.h"
 #include "samples/common/frame_log.h"
-#include "samples/common/machine.h"
 #include "samples/common/progress.h"
 #include "samples/common/rendered_frame.h"
 #include "samples/figurine/image_error.h"
@@ -58,10 +56,10 @@ struct Setting {
 class PersonRenderer {
  public:
   static Result<std::unique_ptr<PersonRenderer>> create(const LoadedPackage& package,
-                                                        const std::string& body_option) {
+                                                        const SamplerReportOptions& options) {
     const Sampler& sampler = package.package.sampler();
     auto made = std::make_unique<PersonRenderer>();
-    Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler);
+    Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler, options.isa);
     if (!device.ok()) return device.status().within(package.path);
     made->sampler_ = std::move(*device);
     made->golden_ = sampler.golden;
@@ -69,7 +67,7 @@ class PersonRenderer {
     FIG_RETURN_IF_ERROR(
         made->sampler_->sample({.seed = 0, .steps = 1}, person).within(package.path));
     Result<std::unique_ptr<LoadedPackage>> body =
-        find_body(person.avatar(), package.path, package.path, body_option);
+        find_body(person.avatar(), package.path, package.path, options.body);
     if (!body.ok()) return body.status();
     made->body_ = std::move(*body);
     return made;
@@ -81,7 +79,8 @@ class PersonRenderer {
     const uint64_t start_ns = ports::now_ns();
     FIG_RETURN_IF_ERROR(sampler_->sample(request, person));
     if (ms != nullptr) *ms = static_cast<double>(ports::now_ns() - start_ns) * 1e-6;
-    Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1});
+    Result<std::unique_ptr<Renderer>> renderer =
+        Renderer::create({.threads = 1, .isa = sampler_->isa()});
     if (!renderer.ok()) return renderer.status();
     const Result<AvatarId> id =
         (*renderer)->add_avatar(person.avatar(), body_->package, Precision::kFloat32);
@@ -190,7 +189,7 @@ Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs,
 
 Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptions& options) {
   const Sampler& sampler = package.package.sampler();
-  Result<std::unique_ptr<PersonRenderer>> made = PersonRenderer::create(package, options.body);
+  Result<std::unique_ptr<PersonRenderer>> made = PersonRenderer::create(package, options);
   if (!made.ok()) return made.status();
   PersonRenderer& people = **made;
   std::vector<std::vector<Setting>> settings(std::size(kSolvers),
@@ -230,11 +229,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
 
   Json json = json_header("report");
   json["date"] = ports::date_utc();
-  json["machine"] = {{"cpu", cpu_name()},
-                     {"cpus", ports::usable_cpus()},
-                     {"threads", 1},
-                     {"precision", "q8"},
-                     {"isa", to_string(supported_isas().back())}};
+  json["machine"] = json_sampling_machine(people.sampler().isa());
   json["sampler"] = package.path;
   json["seeds"] = options.seeds;
   json["size"] = {people.golden().camera.width_px, people.golden().camera.height_px};

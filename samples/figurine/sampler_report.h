@@ -2,17 +2,20 @@
 // of the sampled people.
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "figurine/isa.h"
 #include "figurine/status.h"
 #include "samples/common/loading.h"
 
 namespace figurine::samples {
 
 struct SamplerReportOptions {
-  std::string body;    // empty: found by content hash
-  uint32_t seeds = 4;  // 0, 1, ...: people whose errors are pooled
-  std::string output;  // folder for report.json and report.html
+  std::string body;        // empty: found by content hash
+  std::optional<Isa> isa;  // none: the largest there is
+  uint32_t seeds = 4;      // 0, 1, ...: people whose errors are pooled
+  std::string output;      // folder for report.json and report.html
   bool json = false;
 };
 

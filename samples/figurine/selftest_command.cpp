@@ -11,11 +11,9 @@
 #include <vector>
 
 #include "figurine/avatar_sampler.h"
-#include "ports/host/cpus.h"
 #include "ports/media/png.h"
 #include "samples/common/device_options.h"
 #include "samples/common/loading.h"
-#include "samples/common/machine.h"
 #include "samples/common/progress.h"
 #include "samples/common/rendered_frame.h"
 #include "samples/common/scene.h"
@@ -180,12 +178,15 @@ Result<std::vector<Verdict>> judge(const SelftestOptions& options,
   return verdicts;
 }
 
-Status run_sampler_selftest(const Package& package, const std::string& path, bool as_json) {
+Status run_sampler_selftest(const Package& package, const std::string& path,
+                            const DeviceOptions& options) {
   const Sampler& sampler = package.sampler();
   if (sampler.golden_seeds.empty())
     return Status(StatusCode::kNotFound,
                   path + ": golden seeds: the package has none to compare with");
-  const Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler);
+  const Result<Isa> isa = options.instruction_set();
+  if (!isa.ok()) return isa.status();
+  const Result<std::unique_ptr<AvatarSampler>> device = AvatarSampler::create(sampler, *isa);
   if (!device.ok()) return device.status().within(path);
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   std::string reason;
@@ -210,18 +211,18 @@ Status run_sampler_selftest(const Package& package, const std::string& path, boo
                     {"passed", here == there},
                     {"hash", here},
                     {"golden_hash", there}});
-    if (!as_json) {
+    if (!options.json) {
       std::printf("%s: %s %s: %s\n", path.c_str(), seed.c_str(),
                   here == there ? "agrees to the bit" : "DIFFERS", here.c_str());
     }
     progress.update(rows.size());
   }
-  if (as_json) {
+  if (options.json) {
     nlohmann::ordered_json json = json_header("selftest");
     json["sampler"] = path;
     json["passed"] = reason.empty();
     json["golden_seeds"] = rows;
-    json["machine"] = {{"cpu", cpu_name()}, {"usable_cpus", ports::usable_cpus()}, {"threads", 1}};
+    json["machine"] = json_sampling_machine((*device)->isa());
     print_json(json);
   }
   return reason.empty() ? Status()
@@ -232,7 +233,7 @@ Status run_selftest(const SelftestOptions& options) {
   // Whatever else it is, or is not, is said by what loads an avatar.
   if (const auto loaded = load_package(options.scene.avatars[0]);
       loaded.ok() && (*loaded)->package.kind() == PackageKind::kSampler) {
-    return run_sampler_selftest((*loaded)->package, options.scene.avatars[0], options.device.json);
+    return run_sampler_selftest((*loaded)->package, options.scene.avatars[0], options.device);
   }
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();

@@ -1,12 +1,18 @@
-"""What threads cost where CPUs are few or busy: threads x busy neighbours, of two programs.
+"""What threads cost where CPUs are few or busy: threads x busy neighbours, rendering and training.
 
-    scripts/run python3 scripts/experiments/threads.py BEFORE AFTER [OUTPUT]
+    scripts/run python3 scripts/experiments/threads.py BEFORE AFTER TRAIN [OUTPUT]
 
 BEFORE and AFTER are two builds of `figurine`. Both render the same 60 frames of the shipped walker
 in int8 at 512x512, by turns; a neighbour is a process that only spins. AFTER renders them once more
-with --force-threads where more threads are asked for than there are CPUs. Writes medians of wall
-and CPU seconds to OUTPUT (docs/results/threads.json), and prints them; about ten minutes. Neither
-program need be of this checkout: FIGURINE_BIND=FOLDER shows scripts/run another one.
+with --force-threads where more threads are asked for than there are CPUs.
+
+TRAIN is a `figurine-train`. It trains an edge avatar of the mannequin for 20 iterations, by turns
+with the waiting that libgomp chooses by itself ("before": GOMP_SPINCOUNT=300000) and with its own
+("after").
+
+Writes medians of wall and CPU seconds to OUTPUT (docs/results/threads.json), and prints them; about
+twenty minutes. No program need be of this checkout: FIGURINE_BIND=FOLDER shows scripts/run another
+one. FIGURINE_QUICK=1 runs each case once, on 1 and 2 threads, to see that everything works.
 """
 
 import datetime
@@ -20,24 +26,28 @@ import tempfile
 import threading
 import time
 
-THREADS = (1, 2, 3, 4, 8)
-NEIGHBOURS = (0, 1, 2)
-RUNS = 5
+QUICK = os.environ.get("FIGURINE_QUICK", "") != ""
+THREADS = (1, 2) if QUICK else (1, 2, 3, 4, 8)
+TRAINING_THREADS = (1, 2) if QUICK else (1, 2, 4)
+NEIGHBOURS = (0, 1) if QUICK else (0, 1, 2)
+RUNS = 1 if QUICK else 5
 LONG_S = 10  # a case whose first run takes longer is run once
 LIMIT_S = 60  # what takes longer counts as this
 FRAMES = 60
+ITERATIONS = 20
+PRESET = "edge"
 PACKAGES = pathlib.Path("samples/packages")
+LIBGOMPS_SPINS = "300000"  # env.c of libgomp, where nothing is set
 
 
-def render(program, threads, video, forced):
+def timed(command, environment=None):
     """Wall and CPU seconds of one process, which is ended after LIMIT_S."""
-    command = [program, "render", PACKAGES / "person.fgn", "--motion", PACKAGES / "walk.fgn"]
-    command += ["--frames", f"0:{FRAMES}", "--size", "512x512", "--precision", "q8"]
-    command += ["--threads", threads]
-    command += ["-o", video, *(["--force-threads"] if forced else [])]
     begin = time.monotonic()
     process = subprocess.Popen(
-        [str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [str(word) for word in command],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, **(environment or {})},
     )
     limit = threading.Timer(LIMIT_S, process.kill)
     limit.start()
@@ -45,8 +55,34 @@ def render(program, threads, video, forced):
     limit.cancel()
     wall = time.monotonic() - begin
     if status != 0 and wall < LIMIT_S:
-        sys.exit(f"threads.py: {program}: failed with {os.waitstatus_to_exitcode(status)}")
+        code = os.waitstatus_to_exitcode(status)
+        sys.exit(f"threads.py: {' '.join(str(word) for word in command)}: failed with {code}")
     return wall, usage.ru_utime + usage.ru_stime
+
+
+def rendering(program, threads, folder, forced=False):
+    command = [program, "render", PACKAGES / "person.fgn", "--motion", PACKAGES / "walk.fgn"]
+    command += ["--frames", f"0:{FRAMES}", "--size", "512x512", "--precision", "q8"]
+    command += ["--threads", threads, "-o", folder / "frames.y4m"]
+    return lambda: timed([*command, *(["--force-threads"] if forced else [])])
+
+
+def training(program, threads, folder, environment=None):
+    def train():
+        with tempfile.TemporaryDirectory(dir=folder) as run:
+            command = [program, "avatar", "--data", folder / "capture/000000"]
+            command += ["--body", folder / "body.fgn", "-o", pathlib.Path(run, "run"), "--quiet"]
+            command += ["--preset", PRESET, "--iterations", ITERATIONS]
+            return timed([*command, "--threads", threads, "--force-threads"], environment)
+
+    return train
+
+
+def write_capture(program, folder):
+    """The mannequin, walking, from eight cameras."""
+    timed([program, "body", "--mannequin", "--uv", 128, "-o", folder / "body.fgn"])
+    command = [program, "capture", "--body", folder / "body.fgn", "--identities", 1, "--seed", 1]
+    timed([*command, "--views", 8, "--frames", 8, "--size", "256x256", "-o", folder / "capture"])
 
 
 class Neighbours:
@@ -64,14 +100,14 @@ class Neighbours:
             process.wait()
 
 
-def measure(builds, threads, neighbours, video):
-    """{build: {wall_s, cpu_s, runs}}; builds: {name: (program, forced)}."""
-    seen = {name: [] for name in builds}
+def measure(cases, neighbours):
+    """{case: {wall_s, cpu_s, runs}}; cases: {name: what gives wall and CPU seconds}, by turns."""
+    seen = {name: [] for name in cases}
     with Neighbours(neighbours):
         for _ in range(RUNS):
-            for name, (program, forced) in builds.items():
+            for name, case in cases.items():
                 if not seen[name] or seen[name][0][0] < LONG_S:
-                    seen[name].append(render(program, threads, video, forced))
+                    seen[name].append(case())
     return {
         name: {
             "wall_s": round(statistics.median(wall for wall, _ in runs), 3),
@@ -82,6 +118,18 @@ def measure(builds, threads, neighbours, video):
     }
 
 
+def measure_all(what, thread_counts, cases_of):
+    """A row for threads x neighbours; cases_of: the cases of so many threads."""
+    rows = []
+    for threads in thread_counts:
+        for neighbours in NEIGHBOURS:
+            seen = measure(cases_of(threads), neighbours)
+            rows.append({"threads": threads, "neighbours": neighbours} | seen)
+            walls = ", ".join(f"{name} {case['wall_s']:.2f} s" for name, case in seen.items())
+            print(f"{what}: {threads} threads, {neighbours} neighbours: {walls}", flush=True)
+    return rows
+
+
 def cpu_name():
     for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
         if line.startswith("model name"):
@@ -90,29 +138,34 @@ def cpu_name():
 
 
 def main():
-    if len(sys.argv) not in (3, 4):
-        sys.exit("usage: threads.py BEFORE AFTER [OUTPUT]")
-    before, after = sys.argv[1:3]
-    output = pathlib.Path(sys.argv[3] if len(sys.argv) == 4 else "docs/results/threads.json")
+    if len(sys.argv) not in (4, 5):
+        sys.exit("usage: threads.py BEFORE AFTER TRAIN [OUTPUT]")
+    before, after, train = sys.argv[1:4]
+    output = pathlib.Path(sys.argv[4] if len(sys.argv) == 5 else "docs/results/threads.json")
     cpus, load = len(os.sched_getaffinity(0)), os.getloadavg()[0]
-    rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        for threads in THREADS:
-            builds = {"before": (before, False), "after": (after, False)}
-            if threads > cpus:
-                builds["forced"] = (after, True)
-            for neighbours in NEIGHBOURS:
-                video = pathlib.Path(folder, "frames.y4m")
-                row = {"threads": threads, "neighbours": neighbours}
-                row |= measure(builds, threads, neighbours, video)
-                rows.append(row)
-                walls = ", ".join(f"{name} {row[name]['wall_s']:.2f} s" for name in builds)
-                print(f"{threads} threads, {neighbours} neighbours: {walls}", flush=True)
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+
+        def renderings(threads):
+            cases = {"before": rendering(before, threads, folder),
+                     "after": rendering(after, threads, folder)}
+            forced = {"forced": rendering(after, threads, folder, forced=True)}
+            return cases | (forced if threads > cpus else {})
+
+        def trainings(threads):
+            spins = {"GOMP_SPINCOUNT": LIBGOMPS_SPINS}
+            return {"before": training(train, threads, folder, spins),
+                    "after": training(train, threads, folder)}
+
+        rows = measure_all("rendering", THREADS, renderings)
+        write_capture(train, folder)
+        training_rows = measure_all("training", TRAINING_THREADS, trainings)
     result = {
         "frames": FRAMES,
         "limit_s": LIMIT_S,
         "rows": rows,
-        "command": "scripts/experiments/threads.py BEFORE AFTER",
+        "training": {"iterations": ITERATIONS, "preset": PRESET, "rows": training_rows},
+        "command": "scripts/experiments/threads.py BEFORE AFTER TRAIN",
         "commit": os.environ.get("FIGURINE_COMMIT", "unknown"),
         "machine": {"cpu": cpu_name(), "cpus": cpus, "load_before": round(load, 2)},
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),

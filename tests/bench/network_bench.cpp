@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "bench/dynamic_network.h"
-#include "runtime/fixed_point_networks.h"
+#include "runtime/nn/fixed_point_networks.h"
 #include "runtime/src/nn/fixed_point_runner.h"
 #include "runtime/src/nn/network_runner.h"
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/reference_network.h"
+#include "runtime/nn/reference_network.h"
 
 namespace figurine {
 namespace {

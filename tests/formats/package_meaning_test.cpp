@@ -219,7 +219,8 @@ TEST(PackageAvatar, RejectsLayersBehindTheWritersBack) {
                  "network.0.weights: has shape");
   expect_refused(with([](Network& n) { n.layers[0].op = static_cast<LayerOp>(9); }),
                  "network: layer 0: unknown operator");
-  expect_refused(with([](Network& n) { n.layers.clear(); }), "network: number of layers");
+  expect_refused(with([](Network& n) { n.layers.clear(); }),
+                 "network: has an input, and no layers");
   expect_refused(with([](Network& n) { n.layers.resize(kMaxLayers + 1); }),
                  "network: more than 256 layers", StatusCode::kLimitExceeded);
   expect_refused(with([](Network& n) { n.input_size = 9; }), "pools an odd size");

@@ -14,7 +14,7 @@
 
 #include "largest_error.h"
 #include "oracle/splat_oracle.h"
-#include "runtime/reference_network.h"
+#include "runtime/nn/reference_network.h"
 #include "runtime/splat_scene.h"
 #include "runtime/test_packages.h"
 

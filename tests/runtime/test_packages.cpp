@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "formats/writer/package_writer.h"
-#include "runtime/quantise_network.h"
+#include "runtime/nn/quantise_network.h"
 
 namespace figurine::tests {
 namespace {

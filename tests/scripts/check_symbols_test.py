@@ -9,12 +9,15 @@ import unittest
 
 CHECKER = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_symbols"
 SO = "runtime/libfigurine.so"
+POOL = "runtime/libfigurine_pthreadpool.so"
 ARCHIVES = [
     "runtime/libfigurine_runtime.a",
     "formats/libfigurine_formats.a",
     "formats/libfigurine_words.a",
 ]
 PROGRAMS = ["samples/figurine/figurine", "samples/inspect/figurine-inspect"]
+EXPORTED = 'extern "C" __attribute__((visibility("default"))) void {}() {{}}\n'
+POOLS = EXPORTED.format("pthreadpool_create") + EXPORTED.format("figurine_drop_in_pthreadpool")
 SOUND = '#include <cstdlib>\nvoid* memory(unsigned long n) { return std::malloc(n); }\n'
 PROGRAM = "int main() { return 0; }\n"
 
@@ -48,8 +51,12 @@ BREACHES = [  # (file, source, words of the finding)
     (SO, "#include <iostream>\nvoid f() { std::cout << 1; }", "stream: std::cout"),
     (SO, "namespace torch { void grad(); }\nvoid f() { torch::grad(); }",
      "LibTorch: torch::grad()"),
+    (POOL, "#include <cstdlib>\nchar* f() { return std::getenv(\"HOME\"); }",
+     "environment: getenv"),
     (SO, "extern char large[];\nchar large[500000] = {1};\n#include <cstdlib>\n"
          "void* f() { return std::malloc(1); }", "the limit is 440000"),
+    (POOL, "extern char large[];\nchar large[100000] = {1};\n#include <cstdlib>\n"
+           "void* f() { return std::malloc(1); }", "the limit is 80000"),
     *[(archive, CALL.format("std::exp(x)"), "libm: exp") for archive in ARCHIVES],
     *[(ARCHIVES[0], CALL.format(call), f"libm: {symbol}\n") for call, symbol in INEXACT],
 ]
@@ -90,8 +97,7 @@ def interface():
     for line in lines.splitlines():
         if line.startswith("FIG_DEFAULT("):
             names.add("fig_set_default_" + line.removeprefix("FIG_DEFAULT(").removesuffix(")"))
-    return "".join(f'extern "C" __attribute__((visibility("default"))) void {name}() {{}}\n'
-                   for name in sorted(names))
+    return "".join(EXPORTED.format(name) for name in sorted(names))
 
 
 def build(folder, sources, exported=None):
@@ -102,9 +108,9 @@ def build(folder, sources, exported=None):
         text.write_text(source, encoding="utf-8")
         if name in PROGRAMS:
             subprocess.run(["g++", str(text), "-o", str(path)], check=True)
-        elif name == SO:
-            text.write_text(source + (interface() if exported is None else exported),
-                            encoding="utf-8")
+        elif name in {SO, POOL}:
+            whole = interface() if name == SO else POOLS
+            text.write_text(source + (whole if exported is None else exported), encoding="utf-8")
             command = ["g++", "-O1", "-shared", "-fPIC", "-fvisibility=hidden", str(text), "-o",
                        str(path)]
             subprocess.run(command, check=True)
@@ -124,7 +130,7 @@ class CheckSymbols(unittest.TestCase):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
         build(self.folder.name,
-              dict.fromkeys([SO, *ARCHIVES], SOUND) | dict.fromkeys(PROGRAMS, PROGRAM))
+              dict.fromkeys([SO, POOL, *ARCHIVES], SOUND) | dict.fromkeys(PROGRAMS, PROGRAM))
         self.assertGreater(len(baseline_rows()), 3)
         for row in baseline_rows():
             add_kernel(self.folder.name, row, KERNEL.format(row, 1))
@@ -132,7 +138,7 @@ class CheckSymbols(unittest.TestCase):
     def test_passes_a_sound_build_and_prints_its_size(self):
         code, report = check(self.folder.name)
         self.assertEqual(code, 0, report)
-        self.assertRegex(report, r"0 findings; \d+ bytes stripped")
+        self.assertRegex(report, r"0 findings; \d+ bytes stripped and \d+ of the pool")
 
     def test_names_every_kind_of_breach(self):
         for name, source, words in BREACHES:
@@ -160,6 +166,19 @@ class CheckSymbols(unittest.TestCase):
                 self.assertEqual(code, 1, report)
                 self.assertIn(words, report)
 
+    def test_the_pool_exports_pthreadpool_and_nothing_else(self):
+        for exported, words in [
+                (POOLS + EXPORTED.format("fig_version"), f"{POOL}: exports fig_version, which"),
+                (POOLS + EXPORTED.format("pthreadpool_extra"),
+                 f"{POOL}: exports pthreadpool_extra, which pthreadpool.h does not"),
+                (EXPORTED.format("pthreadpool_create"),
+                 f"{POOL}: does not export figurine_drop_in_pthreadpool")]:
+            with self.subTest(words=words):
+                build(self.folder.name, {POOL: SOUND}, exported)
+                code, report = check(self.folder.name)
+                self.assertEqual(code, 1, report)
+                self.assertIn(words, report)
+
     def test_a_kernel_defines_its_row_and_nothing_else(self):
         for source, words in KERNEL_BREACHES:
             with self.subTest(words=words):
@@ -178,7 +197,7 @@ class CheckSymbols(unittest.TestCase):
         self.assertEqual(code, 0, report)
 
     def test_a_missing_file_is_a_failure(self):
-        for name in [SO, *ARCHIVES, *PROGRAMS]:
+        for name in [SO, POOL, *ARCHIVES, *PROGRAMS]:
             with self.subTest(name=name):
                 kept = pathlib.Path(self.folder.name, name).read_bytes()
                 pathlib.Path(self.folder.name, name).unlink()

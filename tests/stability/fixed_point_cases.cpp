@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "runtime/src/nn/fixed_point_runner.h"
-#include "tests/runtime/fixed_point_networks.h"
-#include "tests/runtime/reference_network.h"
+#include "tests/runtime/nn/fixed_point_networks.h"
+#include "tests/runtime/nn/reference_network.h"
 #include "tests/stability/rows.h"
 #include "tests/stability/scene.h"
 

@@ -7,7 +7,7 @@
 
 #include "figurine/avatar_sampler.h"
 #include "figurine/package.h"
-#include "runtime/random_sampler.h"
+#include "runtime/sample/random_sampler.h"
 #include "runtime/src/sample/device_transformer.h"
 #include "tests/stability/rows.h"
 #include "tests/stability/scene.h"

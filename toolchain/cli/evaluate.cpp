@@ -15,6 +15,7 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
+#include "toolchain/json_number.h"
 #include "toolchain/pictures/contact_sheet.h"
 #include "toolchain/reconstruction/quantization.h"
 #include "toolchain/reconstruction/reconstruction.h"
@@ -51,10 +52,6 @@ nlohmann::json report_head(const EvaluateArguments& arguments, const train::Trai
     if (avatar.description().json.contains(key)) report[key] = avatar.description().json.at(key);
   }
   return report;
-}
-
-nlohmann::json finite(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
 void print_group(const char* title, const nlohmann::json& group) {

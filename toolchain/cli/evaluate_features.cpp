@@ -36,7 +36,7 @@ void print_found(const char* part, const nlohmann::json& found) {
   }
 }
 
-void print_report(const nlohmann::json& report) {
+void print_features(const nlohmann::json& report) {
   print_found("held-out", report.at("held_out"));
   print_found("training", report.at("training"));
   for (const auto& [name, scale] : report.at("scale").items()) {
@@ -79,7 +79,7 @@ void run(const FeaturesArguments& arguments) {
                         {"package_hash", format_hash(population.package.content_hash())}};
   report.update(features::evaluate_networks(population.package, body.package, networks, options));
   train::write_json(arguments.output, report);
-  if (!options.quiet) print_report(report);
+  if (!options.quiet) print_features(report);
 }
 
 }  // namespace

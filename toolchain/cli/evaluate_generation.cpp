@@ -20,6 +20,7 @@
 #include "toolchain/generate/sampler_trainer.h"
 #include "toolchain/generation/captured_people.h"
 #include "toolchain/generation/generation.h"
+#include "toolchain/json_number.h"
 #include "toolchain/members/member_sheets.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
@@ -53,8 +54,6 @@ nlohmann::json head() {
           {"machine", train::describe_machine()},
           {"date", train::utc_now()}};
 }
-
-double number(const nlohmann::json& value) { return value.is_number() ? value.get<double>() : NAN; }
 
 void print_rows(const nlohmann::json& rows) {
   std::printf("%-38s %27s %16s %17s %14s %10s\n", "", "held out: MMD, COV, 1-NNA", "of all draws",

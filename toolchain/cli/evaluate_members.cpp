@@ -12,6 +12,7 @@
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
+#include "toolchain/json_number.h"
 #include "toolchain/members/member_sheets.h"
 #include "toolchain/members/members.h"
 #include "toolchain/train/package_file.h"
@@ -42,8 +43,6 @@ void save_sheet(const std::string& path, const ports::ImageU8& sheet) {
   throw_if_error(ports::write_file_atomically(path, members::encode_sheet(sheet, kMaxSheetBytes)),
                  "cannot save");
 }
-
-double number(const nlohmann::json& value) { return value.is_number() ? value.get<double>() : NAN; }
 
 void print_distances(const nlohmann::json& distances) {
   for (const auto& [title, key] :
@@ -95,7 +94,7 @@ void print_span(const nlohmann::json& span) {
   }
 }
 
-void print_report(const nlohmann::json& report) {
+void print_members(const nlohmann::json& report) {
   for (const auto& [name, summary] : report.at("quality").at("all").items()) {
     std::printf("%-16s mean %7.3f  worst %7.3f  best %7.3f  deviation %.3f\n", name.c_str(),
                 number(summary.at("mean")), number(summary.at("worst")), number(summary.at("best")),
@@ -154,7 +153,7 @@ void run_members(const MembersArguments& arguments) {
   if (strip) save_sheet(arguments.interpolation, *strip);
   if (worst) save_sheet(arguments.worst_sheet, *worst);
   train::write_json(arguments.output, report);
-  print_report(report);
+  print_members(report);
 }
 
 }  // namespace

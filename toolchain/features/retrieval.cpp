@@ -23,7 +23,7 @@ using pictures::PosedMembers;
 
 namespace {
 
-constexpr double kTwoPi = 6.283185307179586;
+constexpr uint64_t kNoiseStream = 201;  // and the next
 constexpr double kBlurs_px[] = {0.5, 1, 2}, kNoises[] = {0.01, 0.03, 0.1};
 
 // Pictures of some members, [members][shots], and which shots are of other poses and other sides.
@@ -244,10 +244,8 @@ RgbPictures blurred(const RgbPictures& pictures, double deviation_px) {
 RgbPictures noisy(const RgbPictures& pictures, double deviation, uint64_t seed) {
   RgbPictures out = pictures;
   for (size_t i = 0; i < out.values.size(); ++i) {
-    const double u = 1 - double(random::random_unit(seed, 201, i)),
-                 v = random::random_unit(seed, 202, i);  // Box-Muller; u is never 0
-    const double normal = std::sqrt(-2 * std::log(u)) * std::cos(kTwoPi * v);
-    out.values[i] = static_cast<float>(std::clamp(out.values[i] + deviation * normal, 0.0, 1.0));
+    const double noise = deviation * random::random_normal(seed, kNoiseStream, i);
+    out.values[i] = static_cast<float>(std::clamp(out.values[i] + noise, 0.0, 1.0));
   }
   return out;
 }

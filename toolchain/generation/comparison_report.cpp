@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "toolchain/json_number.h"
 #include "toolchain/measure/statistics.h"
 
 namespace figurine::generation {
@@ -14,10 +15,6 @@ using measure::Items;
 using measure::quantile;
 using measure::SampleComparison;
 using measure::SampleDistances;
-
-nlohmann::json finite(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
 
 nlohmann::json to_json(const BootstrapInterval& interval) {
   return {{"value", finite(interval.estimate)},

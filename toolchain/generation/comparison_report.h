@@ -9,7 +9,6 @@
 
 namespace figurine::generation {
 
-nlohmann::json finite(double value);                                 // null where it is not
 nlohmann::json to_json(const measure::BootstrapInterval& interval);  // "value", "low", "high"
 
 enum class DistanceUnit { kSquaredError, kOther };

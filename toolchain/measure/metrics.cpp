@@ -10,13 +10,8 @@ namespace figurine::measure {
 
 namespace {
 
-constexpr uint8_t kForegroundAlpha = 127;  // 127/255 < 0.5 < 128/255
-constexpr uint8_t kOpaqueAlpha = 250;      // 249/255 < 0.98 < 250/255
-constexpr int kErosion_px = 3;             // of the mask, where holes are looked for
-
-bool is_foreground(const Picture& truth, size_t pixel) {
-  return truth.rgba[4 * pixel + 3] > kForegroundAlpha;
-}
+constexpr uint8_t kOpaqueAlpha = 250;  // 249/255 < 0.98 < 250/255
+constexpr int kErosion_px = 3;         // of the mask, where holes are looked for
 
 void check_sizes(const Picture& a, const Picture& b) {
   FIG_CHECK(

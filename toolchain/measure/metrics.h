@@ -47,6 +47,11 @@ struct Box {
 
 inline constexpr float kMidGrey = 0.5f;
 
+inline constexpr uint8_t kForegroundAlpha = 127;  // 127/255 < 0.5 < 128/255
+inline bool is_foreground(const Picture& picture, size_t pixel) {
+  return picture.rgba[4 * pixel + 3] > kForegroundAlpha;
+}
+
 // Premultiplied float RGBA, as a splatter leaves it, clamped and rounded to the nearest 8-bit
 // value. rgba: [H,W,4].
 Picture quantise_picture(uint32_t width_px, uint32_t height_px, std::span<const float> rgba);

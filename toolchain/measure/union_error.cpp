@@ -10,12 +10,6 @@ namespace figurine::measure {
 
 namespace {
 
-constexpr uint8_t kForegroundAlpha = 127;
-
-bool is_foreground(const Picture& picture, size_t pixel) {
-  return picture.rgba[4 * pixel + 3] > kForegroundAlpha;
-}
-
 // Over mid-grey, in half levels: 510 is white.
 int16_t half_levels(const Picture& picture, size_t pixel, int channel) {
   const uint8_t* p = &picture.rgba[4 * pixel];

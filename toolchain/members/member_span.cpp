@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "toolchain/json_number.h"
 #include "toolchain/measure/statistics.h"
 #include "toolchain/measure/union_error.h"
 #include "toolchain/train/opened_member.h"
@@ -27,10 +28,6 @@ using measure::with_weights;
 using train::OpenedMember;
 
 namespace {
-
-nlohmann::json finite(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
 
 nlohmann::json describe(const PrincipalBasis& basis, size_t entries) {
   const Eigen::VectorXd& variance = basis.variance();

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include "toolchain/json_number.h"
 #include "toolchain/measure/statistics.h"
 #include "toolchain/measure/union_error.h"
 
@@ -27,10 +28,6 @@ namespace {
 constexpr const char* kRankedBy = "psnr_pose_db";
 constexpr size_t kNamedMembers = 10, kNamedPairs = 10, kBins = 20;
 constexpr Split kSplits[] = {Split::kTrain, Split::kValidation, Split::kTest};
-
-nlohmann::json finite(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
 
 double to_db(double mse) {
   return mse > 0 ? -10 * std::log10(mse) : std::numeric_limits<double>::infinity();

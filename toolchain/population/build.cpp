@@ -28,12 +28,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void make_folder(const std::string& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error) throw InputError(path + ": cannot be created: " + error.message());
-}
-
 // The recipe in the folder stays what it was: members of two recipes are no population.
 void keep_recipe(const BuildOptions& options, const State& state) {
   const nlohmann::json now = train::read_json(options.recipe);
@@ -224,7 +218,7 @@ void make_members(const BuildOptions& options, const Workshop& workshop,
 void build(const BuildOptions& options) {
   Recipe recipe = read_recipe(options.recipe);
   const State state{options.state};
-  make_folder(state.members());
+  train::make_folder(state.members());
   keep_recipe(options, state);
   train::write_json(state.split(), split_of(recipe));
   make_body(recipe, options, state);

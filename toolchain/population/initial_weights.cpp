@@ -56,12 +56,6 @@ void save_text(const std::string& path, const std::string& text) {
   throw_if_error(ports::write_file_atomically(path, std::as_bytes(std::span(text))), "cannot save");
 }
 
-void make_folder(const std::string& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error) throw InputError(path + ": cannot be created: " + error.message());
-}
-
 // The training identities in the order of the recipe.
 std::vector<Identity> learners(const Recipe& recipe) {
   std::vector<Identity> chosen;
@@ -166,7 +160,7 @@ void make_initial_weights(const Workshop& workshop, unsigned slots,
   const State& state = workshop.state;
   if (recipe.rounds == 0 || fs::exists(state.initial_weights())) return;
   const Rounds rounds{state.initial() + "/rounds"};
-  make_folder(rounds.folder);
+  train::make_folder(rounds.folder);
   const std::string captures = state.initial() + "/captures";
   const std::vector<Identity> people = learners(workshop.recipe);
   InitialWeightsProgress at{.people = people.size(), .rounds = recipe.rounds};

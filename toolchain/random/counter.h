@@ -28,6 +28,12 @@ inline float random_unit(uint64_t seed, uint64_t stream, uint64_t counter) {
   return static_cast<float>(random_bits(seed, stream, counter) >> 40) * 0x1p-24f;
 }
 
+// Standard normal by Box and Muller, from 24 bits of this stream and of the next.
+inline double random_normal(uint64_t seed, uint64_t stream, uint64_t counter) {
+  return std::sqrt(-2 * std::log(1 - double{random_unit(seed, stream, counter)})) *
+         std::cos(6.283185307179586 * double{random_unit(seed, stream + 1, counter)});
+}
+
 class CounterRandom {
  public:
   CounterRandom(uint64_t seed, uint64_t stream)

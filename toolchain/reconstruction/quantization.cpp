@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "toolchain/error.h"
+#include "toolchain/json_number.h"
 #include "toolchain/model/fake_quantisation.h"
 #include "toolchain/pictures/avatar_pictures.h"
 #include "toolchain/pictures/pose_sequence.h"
@@ -43,8 +44,6 @@ using quantize::WeightRange;
 
 constexpr uint32_t kSlowKeys = 6, kSlower = 8, kTremblingFrames = 24;
 constexpr size_t kWorstPoses = 5;
-
-json finite(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 // What the UNet is set to for one row.
 struct Variant {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "toolchain/error.h"
+#include "toolchain/json_number.h"
 #include "toolchain/pictures/avatar_pictures.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
@@ -62,10 +63,6 @@ struct Group {
 };
 
 // JSON has no infinity and no NaN: equal pictures and absent pixels become null.
-nlohmann::json finite(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
-
 nlohmann::json to_json(const Group& group) {
   return {{"images", group.images},
           {"psnr_db", finite(group.foreground.psnr_db())},

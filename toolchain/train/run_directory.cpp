@@ -213,6 +213,12 @@ void write_json(const std::string& path, const nlohmann::json& json) {
   write_text(path, json.dump(2) + "\n");
 }
 
+void make_folder(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) throw InputError(path + ": cannot be created: " + error.message());
+}
+
 nlohmann::json describe_machine() {
   std::string cpu = "unknown", line;
   std::ifstream info("/proc/cpuinfo");

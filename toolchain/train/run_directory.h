@@ -78,6 +78,7 @@ std::vector<LogRow> load_log(const RunDirectory& run, uint64_t iteration);
 // Throw InputError naming the file.
 nlohmann::json read_json(const std::string& path);
 void write_json(const std::string& path, const nlohmann::json& json);
+void make_folder(const std::string& path);  // and those above it; there already: nothing to do
 
 // CPU model, cores, operating system: beside every figure.
 nlohmann::json describe_machine();

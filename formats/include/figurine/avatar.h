@@ -13,6 +13,7 @@
 #include "figurine/camera.h"
 #include "figurine/fixed_point.h"
 #include "figurine/network.h"
+#include "figurine/status.h"
 
 namespace figurine {
 
@@ -43,6 +44,46 @@ struct PoseStatistics {
   std::span<const float> mean;        // [3P]
   std::span<const float> covariance;  // [3P,3P] symmetric, regularised to be positive definite
 };
+
+// Which channels of the head a static part may hold: offset, log-scale, quaternion, opacity, and
+// the three colours of SH degree 0.
+inline constexpr uint32_t kStaticChannels = 14;
+inline constexpr uint32_t kStaticColour = 11;  // the first of the colours
+
+// Head channels with one grid, rounded to 8 bits: value = scale[c] * q.
+struct StaticGroup {
+  uint32_t first_channel = 0, channels = 0;
+  uint32_t grid_size = 0;          // cells a side (figurine/texel_grid.h)
+  std::span<const int8_t> values;  // [M,channels], -127 to 127
+  std::span<const float> scale;    // [channels] > 0, normal
+};
+
+// What every texel's Gaussian has whatever the pose: the spatially varying bias of the head. Groups
+// share no channel; channels in none are 0. With s the value at a texel (bilinear in the group's
+// grid) and h the network's output there (bilinear in the network's grid; 0 without a network)
+//
+//   offset, log-scale, quaternion, opacity:  h' = h + s
+//   SH degree 0 of a colour:                 h' = (h + kHalfColour) e^s - kHalfColour
+//   SH above degree 0 of that colour:        h' = h e^s
+//
+// so that a colour is the network's times e^s, and 0 changes nothing.
+struct StaticPart {
+  std::vector<StaticGroup> groups;
+  bool empty() const { return groups.empty(); }
+};
+// In units of SH degree 0's coefficient: the half that splatting adds to a colour.
+inline constexpr float kHalfColour = 1.7724538509f;  // 0.5 / 0.28209479 = sqrt(pi)
+
+// Bounds of |scale[c] * q|: far beyond what a person needs, and e^s and every sum stay finite.
+inline constexpr float kMaxStaticValue = 1000;
+inline constexpr float kMaxStaticLogGain = 20;  // of a colour
+
+// Everything that makes the equations above defined over texels of uv_size a side: channels within
+// kStaticChannels and in one group each, grids that fit, rows of `channels` values, none -128,
+// scales positive, normal and within the bounds. kCorrupt "static part: group G: ...".
+Status validate_static_part(const StaticPart& part, uint32_t uv_size);
+// The same, and one row of values for every cell that the body covers.
+Status validate_static_part(const StaticPart& part, const Body& body);
 
 // In which arithmetic a network is evaluated.
 enum class Precision : uint8_t { kFloat32, kFixedPoint };
@@ -98,15 +139,23 @@ struct AvatarTraits {
   const AvatarTraits& traits() const { return *this; }
 };
 
-// The network's float weights may be absent if fixed_point is there.
+// The network's float weights may be absent if fixed_point is there. The network may run on a grid
+// coarser than the body's texels (network.input_size < uv_size; figurine/texel_grid.h), and there
+// may be none (no layers, input_size, input_channels and fourier_octaves 0): then there is a static
+// part.
 struct Avatar : AvatarKind, AvatarTraits {
   std::string name;
+  uint32_t uv_size = 0;           // T of the body; 0: that of the network, texels_a_side() says it
   std::span<const float> shape;   // [<= S]
   FixedPointNetwork fixed_point;  // empty if the package has none
+  StaticPart static_part;         // empty if the package has none
   PoseStatistics pose_statistics;
 
-  // A package holds one or both.
+  bool has_network() const { return !network.layers.empty(); }
+  uint32_t texels_a_side() const { return uv_size != 0 ? uv_size : network.input_size; }  // T
+  // A package holds one or both; both where there is no network to evaluate.
   bool holds(Precision precision) const {
+    if (!has_network()) return true;
     return precision == Precision::kFixedPoint ? !fixed_point.empty() : has_weights(network);
   }
 };

@@ -34,6 +34,8 @@ inline constexpr size_t kBlobAlignment = 64;
 inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1} << 0;
 // A head's offsets have a bound (HeadDecoding::max_offset): who ignored it would draw other pixels.
 inline constexpr uint64_t kFeatureBoundedOffsets = uint64_t{1} << 1;
+// An avatar has a static part, or a network on a grid coarser than the texels, or no network.
+inline constexpr uint64_t kFeatureStaticPart = uint64_t{1} << 2;
 
 enum class PackageKind : uint8_t {
   kBody = 1,
@@ -136,6 +138,7 @@ class Package {
   Provenance member_provenance(size_t member) const;
   const std::vector<TensorInfo>& tensors() const;
   uint64_t size_bytes() const;
+  uint64_t index_bytes() const;  // of the index alone
 
  private:
   struct Contents;
@@ -151,8 +154,8 @@ std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8);
 // coefficients.
 std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape);
 
-// An avatar fits a body if the hash, the UV size, the shape count and the golden pose's joint count
-// do. kMismatch names both hashes.
+// An avatar fits a body if the hash, the UV size, the cells of its static part, the shape count and
+// the golden pose's joint count do. kMismatch names both hashes.
 Status check_avatar_fits_body(const Avatar& avatar, const Package& body);
 Status check_motion_fits_body(const Motion& motion, const Body& body);
 

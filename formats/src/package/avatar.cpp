@@ -1,12 +1,13 @@
-// The meaning of an avatar package: a network whose shapes fit its weights and its head, parameters
-// that decode to sound Gaussians, a pose distribution that can be inverted, a golden frame that can
-// be drawn.
+// The meaning of an avatar package: a network whose shapes fit its weights and its head, a static
+// part whose grids fit the map, parameters that decode to sound Gaussians, a pose distribution that
+// can be inverted, a golden frame that can be drawn.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "figurine/gaussian.h"
+#include "figurine/texel_grid.h"
 #include "formats/src/package/content.h"
 
 namespace figurine {
@@ -49,9 +50,14 @@ Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, 
 }
 
 // Shapes first, from the layer list alone: they say how large each weight blob has to be.
-Status read_layers(const schema::Network& table, Network& out) {
+Status read_layers(const schema::Network& table, NoNetwork none, Network& out) {
   out.input_size = table.input_size();
   out.input_channels = table.input_channels();
+  if (none == NoNetwork::kAllowed && table.layers()->size() == 0) {
+    return out.input_size == 0 && out.input_channels == 0
+               ? Status()
+               : corrupt("network", "has an input, and no layers");
+  }
   if (table.layers()->size() > kMaxLayers)
     return over_limit("network", "more than ", kMaxLayers, " layers");
   for (const schema::Layer* entry : *table.layers()) {
@@ -136,13 +142,58 @@ Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, cons
 // In float, in fixed point, or both.
 Status read_weights(const schema::Avatar& table, BlobReader& blobs, Avatar& out) {
   const bool has_fixed_point = table.fixed_point() != nullptr;
+  if (!out.has_network()) {
+    return has_fixed_point ? corrupt("avatar.fixed_point", "is there, a network is not") : Status();
+  }
   FIG_RETURN_IF_ERROR(read_float_weights(blobs, has_fixed_point, out.network));
   return has_fixed_point
              ? read_fixed_point(*table.fixed_point(), blobs, out.network, out.fixed_point)
              : Status();
 }
 
+// Texels a side, and the network's grid over them.
+Status read_uv_size(const schema::Avatar& table, Avatar& out) {
+  out.uv_size = table.uv_size();
+  if (out.uv_size > kMaxUvSize) return over_limit("avatar.uv_size", "is larger than ", kMaxUvSize);
+  if (out.has_network()) {
+    return grid_fits(out.texels_a_side(), out.network.input_size)
+               ? Status()
+               : corrupt("avatar.uv_size", "is not 1, 2, 4 or 8 times the network's input size");
+  }
+  if (out.uv_size == 0) return corrupt("avatar.uv_size", "is missing, and there is no network");
+  return out.fourier_octaves == 0
+             ? Status()
+             : corrupt("avatar.fourier_octaves", "is not 0, and there is no network");
+}
+
+Status read_static_part(const schema::Avatar& table, BlobReader& blobs, Avatar& out) {
+  std::vector<StaticGroup>& groups = out.static_part.groups;
+  const uint32_t count = table.static_groups() == nullptr ? 0 : table.static_groups()->size();
+  if (count == 0 && !out.has_network())
+    return corrupt("avatar", "has neither a network nor a static part");
+  if (count > kStaticChannels)
+    return over_limit("avatar.static_groups", "has more than ", kStaticChannels, " groups");
+  for (uint32_t g = 0; g < count; ++g) {
+    const schema::StaticGroup& entry = *table.static_groups()->Get(g);
+    StaticGroup& group = groups.emplace_back();
+    const std::string name = concatenate({"static.", g});
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".scale", {BlobReader::kAny}, group.scale));
+    group.first_channel = entry.first_channel();
+    group.channels = static_cast<uint32_t>(group.scale.size());
+    group.grid_size = entry.grid_size();
+    FIG_RETURN_IF_ERROR(
+        blobs.read(name + ".values", {BlobReader::kAny, group.channels}, group.values));
+  }
+  return validate_static_part(out.static_part, out.texels_a_side());
+}
+
 }  // namespace
+
+Status check_gaussians(const Budget& budget, uint32_t uv_size) {
+  if (budget.gaussians > uint64_t{uv_size} * uv_size)
+    return corrupt("budget.gaussians", "is more than the map has texels");
+  return {};
+}
 
 Status check_network_fits(const AvatarKind& kind, const HeadDecoding& decoding,
                           std::string_view owner, const Budget& budget) {
@@ -181,9 +232,6 @@ Status check_network_fits(const AvatarKind& kind, const HeadDecoding& decoding,
       budget.macs_per_frame != 0 && macs > budget.macs_per_frame) {
     return over_limit("budget.macs_per_frame", "declares ", budget.macs_per_frame,
                       ", the network needs ", macs);
-  }
-  if (budget.gaussians > uint64_t{kind.network.input_size} * kind.network.input_size) {
-    return corrupt("budget.gaussians", "is more than the map has texels");
   }
   return {};
 }
@@ -313,7 +361,7 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
                    Avatar& out) {
   const schema::Avatar& table = *index.content_as_Avatar();
   FIG_RETURN_IF_ERROR(read_text(index.name(), "avatar.name", layout::kMaxNameBytes, out.name));
-  FIG_RETURN_IF_ERROR(read_kind(table, "avatar", out));
+  FIG_RETURN_IF_ERROR(read_kind(table, "avatar", out, NoNetwork::kAllowed));
   FIG_RETURN_IF_ERROR(
       blobs.read("avatar.shape", {BlobReader::kAny}, out.shape, BlobReader::kMayBeAbsent));
   if (out.shape.size() > kMaxShapeCoefficients) {
@@ -322,14 +370,19 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
   FIG_RETURN_IF_ERROR(check_magnitude(out.shape, "avatar.shape", 1000));
   FIG_RETURN_IF_ERROR(read_maps_and_head(table, "avatar", out));
   FIG_RETURN_IF_ERROR(read_weights(table, blobs, out));
-  FIG_RETURN_IF_ERROR(check_network_fits(out, out.decoding, "avatar", budget));
+  if (out.has_network())
+    FIG_RETURN_IF_ERROR(check_network_fits(out, out.decoding, "avatar", budget));
+  FIG_RETURN_IF_ERROR(read_uv_size(table, out));
+  FIG_RETURN_IF_ERROR(check_gaussians(budget, out.texels_a_side()));
+  FIG_RETURN_IF_ERROR(read_static_part(table, blobs, out));
   if (table.pose_statistics() != nullptr) {
     FIG_RETURN_IF_ERROR(
         read_pose_statistics(*table.pose_statistics(), "avatar", blobs, out.pose_statistics));
   }
   if (table.golden() != nullptr)
     FIG_RETURN_IF_ERROR(read_golden(*table.golden(), blobs, out.golden));
-  if (out.fixed_point.empty() && out.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
+  if (!out.holds(Precision::kFixedPoint) &&
+      out.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
     return corrupt("golden.fixed_point_hash", "is there, a network in fixed point is not");
   }
   return {};

@@ -44,11 +44,13 @@ Status read_map_statistics(const schema::MapStatistics& table, std::string_view 
                            MapStatistics& out);
 Status read_decoding(const schema::HeadDecoding& table, std::string_view owner, HeadDecoding& out);
 // Layers and input, no weights; the shapes fit each other.
-Status read_layers(const schema::Network& table, Network& out);
+enum class NoNetwork : bool { kRefused, kAllowed };  // no layers, and no input
+Status read_layers(const schema::Network& table, NoNetwork none, Network& out);
 // Table: schema::Avatar, schema::Population or schema::Sampler, whose fields of one name are one
 // thing. The network has no weights yet.
 template <class Table>
-Status read_kind(const Table& table, std::string_view owner, AvatarKind& out) {
+Status read_kind(const Table& table, std::string_view owner, AvatarKind& out,
+                 NoNetwork none = NoNetwork::kRefused) {
   FIG_RETURN_IF_ERROR(read_text(table.body_name(), concatenate({owner, ".body_name"}),
                                 layout::kMaxNameBytes, out.body_name));
   FIG_RETURN_IF_ERROR(read_text(table.preset(), concatenate({owner, ".preset"}),
@@ -58,7 +60,7 @@ Status read_kind(const Table& table, std::string_view owner, AvatarKind& out) {
     return unsupported(concatenate({owner, ".template_mode"}), "is unknown");
   out.template_mode = static_cast<TemplateMode>(table.template_mode());
   out.fourier_octaves = table.fourier_octaves();
-  return read_layers(*table.network(), out.network);
+  return read_layers(*table.network(), none, out.network);
 }
 // Table: schema::Avatar, schema::Member or schema::Sampler. The golden frame is the caller's.
 template <class Table>
@@ -69,6 +71,8 @@ Status read_maps_and_head(const Table& table, std::string_view owner, AvatarTrai
 // "prefix.i.weights" and "prefix.i.bias" of every convolution, finite.
 Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader::Presence presence,
                          Network& out);
+// The declared Gaussians against the map of uv_size texels a side.
+Status check_gaussians(const Budget& budget, uint32_t uv_size);
 // The network against maps, head and budget; the avatar's weights are not looked at.
 Status check_network_fits(const AvatarKind& kind, const HeadDecoding& decoding,
                           std::string_view owner, const Budget& budget);

@@ -36,7 +36,13 @@ struct Header {
 static_assert(sizeof(Header) == kPackageHeaderBytes && offsetof(Header, header_checksum) == 56);
 inline constexpr size_t kSealedHeaderBytes = offsetof(Header, header_checksum);
 
-inline constexpr uint64_t kKnownRequiredFeatures = kFeatureFixedPoint | kFeatureBoundedOffsets;
+inline constexpr uint64_t kKnownRequiredFeatures =
+    kFeatureFixedPoint | kFeatureBoundedOffsets | kFeatureStaticPart;
+
+// Whether kFeatureStaticPart is set.
+inline bool needs_static_feature(const Avatar& avatar) {
+  return !avatar.static_part.empty() || avatar.texels_a_side() != avatar.network.input_size;
+}
 
 // The first multiple of the blob alignment at or after the offset. Offsets are below 2^63.
 constexpr uint64_t align_up(uint64_t offset) {

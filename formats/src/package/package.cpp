@@ -106,8 +106,11 @@ Status check_feature(const layout::Header& header, uint64_t feature, bool held, 
 Status check_features(const layout::Header& header, const Content& content) {
   const Avatar* avatar = std::get_if<Avatar>(&content);
   FIG_RETURN_IF_ERROR(check_feature(header, kFeatureFixedPoint,
-                                    avatar != nullptr && avatar->holds(Precision::kFixedPoint),
+                                    avatar != nullptr && !avatar->fixed_point.empty(),
                                     "fixed point", "a network is "));
+  FIG_RETURN_IF_ERROR(check_feature(header, kFeatureStaticPart,
+                                    avatar != nullptr && layout::needs_static_feature(*avatar),
+                                    "static parts", "an avatar is "));
   return check_feature(header, kFeatureBoundedOffsets, has_bounded_offsets(content),
                        "bounded offsets", "a decoding is ");
 }
@@ -166,6 +169,7 @@ const Budget& Package::budget() const { return contents_->budget; }
 const Provenance& Package::provenance() const { return contents_->provenance; }
 const std::vector<TensorInfo>& Package::tensors() const { return contents_->tensors; }
 uint64_t Package::size_bytes() const { return contents_->header.file_bytes; }
+uint64_t Package::index_bytes() const { return contents_->header.index_bytes; }
 
 const Body& Package::body() const {
   FIG_CHECK(kind() == PackageKind::kBody, "the package is not a body");
@@ -248,10 +252,12 @@ Status check_avatar_fits_body(const Avatar& avatar, const Package& package) {
     return mismatch({"made for '", avatar.body_name, "' ", format_hash(avatar.body_hash),
                      ", this is '", body.name, "' ", format_hash(package.content_hash())});
   }
-  if (avatar.network.input_size != body.uv_size) {
+  if (avatar.texels_a_side() != body.uv_size) {
     return mismatch(
-        {"its map has ", avatar.network.input_size, " texels a side, the body's ", body.uv_size});
+        {"its map has ", avatar.texels_a_side(), " texels a side, the body's ", body.uv_size});
   }
+  if (const Status status = validate_static_part(avatar.static_part, body); !status.ok())
+    return mismatch({status.message()});
   if (avatar.shape.size() > body.shape_count()) {
     return mismatch(
         {"it has ", avatar.shape.size(), " shape coefficients, the body ", body.shape_count()});

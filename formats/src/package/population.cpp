@@ -238,6 +238,7 @@ Status read_population(const schema::Index& index, BlobReader& blobs, const Budg
                                  layout::kMaxNameBytes, false, out.quality_names));
   FIG_RETURN_IF_ERROR(read_members(table, content));
   FIG_RETURN_IF_ERROR(check_members_fit(out, budget));
+  FIG_RETURN_IF_ERROR(check_gaussians(budget, out.network.input_size));
   FIG_RETURN_IF_ERROR(read_convolutions(blobs, "initial", BlobReader::kRequired, out.network));
   FIG_RETURN_IF_ERROR(read_differences(blobs, out));
   const auto members = static_cast<uint32_t>(out.size());

@@ -40,6 +40,7 @@ Status read_shared(const schema::Sampler& table, const Budget& budget, Sampler& 
     return over_limit("sampler.shape_count", "is above ", kMaxShapeCoefficients);
   FIG_RETURN_IF_ERROR(read_maps_and_head(table, "sampler", out));
   FIG_RETURN_IF_ERROR(check_network_fits(out, out.decoding, "sampler", budget));
+  FIG_RETURN_IF_ERROR(check_gaussians(budget, out.network.input_size));
   return read_quantisation(table, out);
 }
 

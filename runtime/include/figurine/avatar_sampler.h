@@ -68,6 +68,7 @@ class AvatarSampler {
   // finite, as of a package that was trained badly. out is then of no use.
   Status sample(const SampleRequest& request, SampledAvatar& out, Trace* trace = nullptr);
 
+  Isa isa() const;                // of the kernels that run
   uint64_t memory_bytes() const;  // beside the package and SampledAvatar
   uint64_t macs_per_evaluation() const;
 

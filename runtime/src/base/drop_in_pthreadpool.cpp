@@ -1,5 +1,6 @@
-// pthreadpool's interface on threads that give way (worker_pool.h), to be linked into a program in
-// place of the system's library: XNNPACK, whose loops these are, then finds these functions first.
+// pthreadpool's interface on threads that give way (worker_pool.h), to be linked into a program, or
+// loaded beside libfigurine.so, in place of the system's library: XNNPACK, whose loops these are,
+// then finds these functions first.
 //
 // The system's pool waits by spinning, for tens of milliseconds: a caller waits for a worker to
 // come even if nothing is left to do, and keeps the CPU that the worker is to run on. Where CPUs
@@ -17,7 +18,8 @@
 #include <new>
 #include <utility>
 
-#include "runtime/src/base/thread_pool.h"
+#include "runtime/src/base/drop_in_pthreadpool.h"
+#include "runtime/src/base/worker_pool.h"
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>
@@ -127,6 +129,8 @@ struct Grid {
   }
 };
 
+thread_local uint64_t loops_alone = 0;
+
 template <size_t D, size_t K, class Call>
 void loop(pthreadpool* pool, const std::array<size_t, D>& range, const std::array<size_t, K>& tile,
           uint32_t flags, const Call& call) {
@@ -135,6 +139,7 @@ void loop(pthreadpool* pool, const std::array<size_t, D>& range, const std::arra
   if (pool != nullptr) {
     pool->workers->run(grid.count, grid.share, &grid);
   } else {
+    ++loops_alone;
     WorkerPool::run_alone(grid.count, grid.share, &grid);
   }
 }
@@ -158,11 +163,7 @@ auto with_uarch_with_thread(Function* function, void* context, uint32_t uarch) {
   return [=](size_t thread, auto... at) { function(context, uarch, thread, at...); };
 }
 
-}  // namespace
-
-extern "C" {
-
-pthreadpool_t pthreadpool_create(size_t threads_count) {
+pthreadpool* create(size_t threads_count) {
   if (threads_count == 0) threads_count = figurine::allowed_cpus();
   std::unique_ptr<pthreadpool> pool(new (std::nothrow) pthreadpool);
   if (pool == nullptr) return nullptr;
@@ -171,7 +172,20 @@ pthreadpool_t pthreadpool_create(size_t threads_count) {
   return pool->workers != nullptr ? pool.release() : nullptr;
 }
 
-void pthreadpool_destroy(pthreadpool_t pool) { delete pool; }
+void destroy(pthreadpool* pool) { delete pool; }
+
+constexpr figurine::DropInPthreadpool kDropIn = {
+    .create = create, .destroy = destroy, .loops_alone = [] { return loops_alone; }};
+
+}  // namespace
+
+extern "C" {
+
+const figurine::DropInPthreadpool* figurine_drop_in_pthreadpool() { return &kDropIn; }
+
+pthreadpool_t pthreadpool_create(size_t threads_count) { return create(threads_count); }
+
+void pthreadpool_destroy(pthreadpool_t pool) { destroy(pool); }
 
 size_t pthreadpool_get_threads_count(pthreadpool_t pool) {
   return pool == nullptr ? 1 : pool->workers->threads();

@@ -12,6 +12,8 @@
 #include <string>
 #include <utility>
 
+#include "runtime/src/base/drop_in_pthreadpool.h"
+
 namespace figurine {
 namespace {
 
@@ -49,9 +51,17 @@ uint32_t count_startable(uint32_t wanted) {
   return started;
 }
 
+pthreadpool* create_network_pool(uint32_t threads) {
+  if (figurine_drop_in_pthreadpool == nullptr) return ::pthreadpool_create(threads);
+  return figurine_drop_in_pthreadpool()->create(threads);
+}
+
 }  // namespace
 
-void ThreadPool::PoolDeleter::operator()(pthreadpool* pool) const { ::pthreadpool_destroy(pool); }
+void ThreadPool::PoolDeleter::operator()(pthreadpool* pool) const {
+  if (figurine_drop_in_pthreadpool == nullptr) return ::pthreadpool_destroy(pool);
+  figurine_drop_in_pthreadpool()->destroy(pool);
+}
 
 ThreadPool::ThreadPool(std::unique_ptr<WorkerPool> workers, pthreadpool* network)
     : workers_(std::move(workers)), network_(network) {}
@@ -65,7 +75,7 @@ Result<ThreadPool> ThreadPool::create(uint32_t threads) {
   }
   // Half of them for XNNPACK.
   if (threads > 1) threads = 1 + count_startable(2 * (threads - 1)) / 2;
-  pthreadpool* const network = threads > 1 ? ::pthreadpool_create(threads) : nullptr;
+  pthreadpool* const network = threads > 1 ? create_network_pool(threads) : nullptr;
   ThreadPool pool(WorkerPool::create(threads), network);
   if (pool.workers_ == nullptr || (threads > 1 && network == nullptr))
     return Status(StatusCode::kOutOfMemory, "threads: no memory for a pool");
@@ -84,13 +94,5 @@ Result<std::shared_ptr<ThreadPool>> make_thread_pool(const ThreadOptions& option
 }
 
 uint32_t thread_count(const ThreadPool& pool) { return pool.threads(); }
-
-uint32_t allowed_cpus() {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  // A machine with more CPUs than the set has room for has more than a pool has threads.
-  if (::sched_getaffinity(0, sizeof(set), &set) != 0) return ThreadPool::kMaxThreads;
-  return static_cast<uint32_t>(std::max(CPU_COUNT(&set), 1));
-}
 
 }  // namespace figurine

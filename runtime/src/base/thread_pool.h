@@ -1,6 +1,6 @@
 // The runtime's threads: workers for its own loops (worker_pool.h), and beside them the pthreadpool
-// that XNNPACK insists on. A program may link drop_in_pthreadpool.cpp, whose pthreadpool gives way
-// as well; the system's waits by spinning.
+// that XNNPACK insists on. Where drop_in_pthreadpool.cpp is linked that gives way as well; the
+// system's waits by spinning.
 #pragma once
 
 #include <cstddef>
@@ -39,7 +39,8 @@ class ThreadPool {
   }
 
   uint32_t threads() const { return workers_->threads(); }
-  // Of as many threads. Null for one thread, as XNNPACK wants it.
+  // Of as many threads. Null for one thread, as XNNPACK wants it. For XNNPACK by way of
+  // xnnpack_pool() alone (runtime/src/nn/xnnpack_graph.h).
   pthreadpool* network_pool() const { return network_.get(); }
 
  private:
@@ -51,8 +52,5 @@ class ThreadPool {
   std::unique_ptr<WorkerPool> workers_;
   std::unique_ptr<pthreadpool, PoolDeleter> network_;
 };
-
-// CPUs that this process may run on, by its affinity mask.
-uint32_t allowed_cpus();
 
 }  // namespace figurine

@@ -1,8 +1,10 @@
 #include "runtime/src/base/worker_pool.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <new>
 #include <utility>
 #include <vector>
@@ -152,5 +154,13 @@ void WorkerPool::run_alone(size_t count, Share share, void* context) {
 }
 
 uint32_t WorkerPool::threads() const { return impl_->started + 1; }
+
+uint32_t allowed_cpus() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  // A machine with more CPUs than the set has room for has more than a pool has threads.
+  if (::sched_getaffinity(0, sizeof(set), &set) != 0) return WorkerPool::kMaxThreads;
+  return static_cast<uint32_t>(std::max(CPU_COUNT(&set), 1));
+}
 
 }  // namespace figurine

@@ -65,4 +65,7 @@ class WorkerPool::Loop {
   size_t count_ = 0;
 };
 
+// CPUs that this process may run on, by its affinity mask.
+uint32_t allowed_cpus();
+
 }  // namespace figurine

@@ -4,10 +4,21 @@
 #include <limits>
 #include <string>
 
+#include "runtime/src/base/drop_in_pthreadpool.h"
+
 namespace figurine {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Two numbers copied by XNNPACK without a pool: a loop that the drop-in counts if it is its own.
+bool loops_are_of(const DropInPthreadpool& drop_in) {
+  const uint32_t from[] = {1, 2, 3, 4};
+  uint32_t to[] = {0, 0};
+  const uint64_t before = drop_in.loops_alone();
+  const xnn_status status = xnn_run_copy_nc_x32(1, 2, 1, 2, from, to, 0, nullptr);
+  return status == xnn_status_success && drop_in.loops_alone() != before;
+}
 
 }  // namespace
 
@@ -36,6 +47,12 @@ Status initialize_xnnpack() {
                 error.message() + "; it identifies the CPU through /proc, is that mounted?");
 }
 
+pthreadpool* xnnpack_pool(const ThreadPool& pool) {
+  if (figurine_drop_in_pthreadpool == nullptr) return pool.network_pool();
+  static const bool same_library = loops_are_of(*figurine_drop_in_pthreadpool());
+  return same_library ? pool.network_pool() : nullptr;
+}
+
 void XnnRuntimeDeleter::operator()(xnn_runtime* runtime) const { xnn_delete_runtime(runtime); }
 
 Status GraphBuilder::build(std::span<void* const> buffers, ThreadPool& pool, XnnRuntime& runtime) {
@@ -52,7 +69,7 @@ Status GraphBuilder::build(std::span<void* const> buffers, ThreadPool& pool, Xnn
       FIG_RETURN_IF_ERROR(define_layer(i).within("layer " + std::to_string(i)));
   }
   xnn_runtime_t created = nullptr;
-  const xnn_status packed = xnn_create_runtime_v4(subgraph, nullptr, nullptr, pool.network_pool(),
+  const xnn_status packed = xnn_create_runtime_v4(subgraph, nullptr, nullptr, xnnpack_pool(pool),
                                                   XNN_FLAG_YIELD_WORKERS, &created);
   runtime.reset(created);
   FIG_RETURN_IF_ERROR(xnnpack_status(packed, "packing the network"));

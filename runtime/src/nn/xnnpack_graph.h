@@ -24,6 +24,10 @@ static_assert(kBufferPadding >= XNN_EXTRA_BYTES);
 Status xnnpack_status(xnn_status status, const char* what);
 // Idempotent and thread-safe.
 Status initialize_xnnpack();
+// The pool that XNNPACK's loops can use: null, one thread, where they are another library's than
+// the pool is, as in a process that had loaded XNNPACK before it loaded us and our drop-in. After
+// initialize_xnnpack().
+pthreadpool* xnnpack_pool(const ThreadPool& pool);
 
 // Copies of weights that live until they are packed: packing may read past the end, and a mapped
 // package may end with its page.

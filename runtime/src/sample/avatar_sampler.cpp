@@ -30,6 +30,7 @@ struct AvatarSampler::Impl {
   explicit Impl(const Sampler& from) : sampler(from) {}
 
   const Sampler sampler;  // a copy: its arrays alone are borrowed
+  Isa isa = Isa::kBaseline;
   NoiseSchedule schedule;
   std::unique_ptr<DeviceTransformer> transformer;
   std::vector<NoiseLevel> levels;
@@ -146,6 +147,7 @@ Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& samp
       DeviceTransformer::create(impl->sampler, **kernels);
   if (!transformer.ok()) return transformer.status();
   impl->transformer = std::move(*transformer);
+  impl->isa = (*kernels)->isa;
   return std::unique_ptr<AvatarSampler>(new AvatarSampler(std::move(impl)));
 }
 
@@ -176,6 +178,8 @@ Status AvatarSampler::sample(const SampleRequest& request, SampledAvatar& out, T
   FIG_RETURN_IF_ERROR(predictor.traced);
   return impl.decode(impl.z.span(size), out.weights_, out.fixed_point_, out.avatar_);
 }
+
+Isa AvatarSampler::isa() const { return impl_->isa; }
 
 uint64_t AvatarSampler::memory_bytes() const {
   return impl_->z.memory_bytes() + impl_->x0.memory_bytes() + impl_->previous_x0.memory_bytes() +

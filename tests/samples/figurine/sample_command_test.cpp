@@ -4,13 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
 #include "formats/writer/sampler_writer.h"
 #include "ports/host/files.h"
-#include "runtime/random_sampler.h"
+#include "runtime/sample/random_sampler.h"
 #include "samples/program.h"
 
 namespace figurine {
@@ -57,8 +58,19 @@ class SampleCommand : public testing::Test {
     write_sampler("crowd.fgn");
   }
 
-  ProgramRun run(const std::string& arguments, const std::string& before = "") {
-    return run_figurine(arguments, {.environment = "", .before = before, .folder = folder_.path()});
+  ProgramRun run(const std::string& arguments, const std::string& before = "",
+                 const std::string& environment = "") {
+    return run_figurine(arguments,
+                        {.environment = environment, .before = before, .folder = folder_.path()});
+  }
+  // What seed 0's weights are on this device, as a sampler says it of its golden seeds.
+  std::array<uint64_t, 2> hash_of_seed_0() {
+    const ProgramRun sampled = run("sample crowd.fgn --seed 0 --json -o x.fgn");
+    const auto hex = nlohmann::json::parse(sampled.out).at("weights_hash").get<std::string>();
+    const std::array<uint64_t, 2> hash = {std::stoull(hex.substr(16), nullptr, 16),
+                                          std::stoull(hex.substr(0, 16), nullptr, 16)};
+    EXPECT_EQ(format_hash(hash), hex);
+    return hash;
   }
 
   TestFolder folder_;
@@ -128,11 +140,7 @@ TEST_F(SampleCommand, GoldenSeedsAreHeldAgainstThisDevice) {
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_NE(none.err.find("golden seeds"), std::string::npos) << none.err;
 
-  const ProgramRun sampled = run("sample crowd.fgn --seed 0 --json -o x.fgn");
-  const auto hex = nlohmann::json::parse(sampled.out).at("weights_hash").get<std::string>();
-  const std::array<uint64_t, 2> hash = {std::stoull(hex.substr(16), nullptr, 16),
-                                        std::stoull(hex.substr(0, 16), nullptr, 16)};
-  ASSERT_EQ(format_hash(hash), hex);
+  const std::array<uint64_t, 2> hash = hash_of_seed_0();
   write_sampler("golden.fgn", hash);
   const ProgramRun right = run("selftest golden.fgn --json");
   EXPECT_EQ(right.exit_code, 0) << right.err;
@@ -183,6 +191,33 @@ TEST_F(SampleCommand, TheReportHasADialForEachSolver) {
   EXPECT_NE(folder_.read("report/report.html").find("seed 0, the reference"), std::string::npos);
   EXPECT_EQ(run("report crowd.fgn --body other_body.fgn -o nowhere").exit_code, 1);
   EXPECT_FALSE(folder_.has("nowhere"));
+}
+
+// Of the sampling and of what is drawn of it, in every command that samples.
+TEST_F(SampleCommand, AnInstructionSetIsNamedByOptionOrEnvironment) {
+  write_sampler("golden.fgn", hash_of_seed_0());
+  const std::vector<std::string> before = folder_.names();
+  for (const std::string command :
+       {"sample crowd.fgn --seed 7 --trace steps -o a.fgn", "selftest golden.fgn",
+        "report golden.fgn --seeds 1 -o report"}) {
+    const ProgramRun option = run(command + " --isa mmx");
+    EXPECT_EQ(option.exit_code, 1) << command;
+    EXPECT_NE(option.err.find("isa 'mmx' is unsupported"), std::string::npos) << option.err;
+    const ProgramRun variable = run(command, "", "FIGURINE_ISA=mmx ");
+    EXPECT_EQ(variable.exit_code, 1) << command;
+    EXPECT_NE(variable.err.find("FIGURINE_ISA: isa 'mmx'"), std::string::npos) << variable.err;
+    EXPECT_EQ(folder_.names(), before) << command;
+
+    const ProgramRun named = run(command + " --isa baseline --json", "", "FIGURINE_ISA=mmx ");
+    ASSERT_EQ(named.exit_code, 0) << named.err;
+    const nlohmann::json machine = nlohmann::json::parse(named.out).at("machine");
+    EXPECT_EQ(machine.at("isa"), "baseline") << command;
+    EXPECT_EQ(machine.at("precision"), "q8") << command;
+    EXPECT_EQ(machine.at("threads"), 1) << command;
+    EXPECT_GE(machine.at("cpus").get<int>(), 1) << command;
+    for (const char* written : {"a.fgn", "steps", "report"})
+      std::filesystem::remove_all(folder_.path(written));
+  }
 }
 
 // As it lies in a checkout: the sampler's body is in the folder of its population.

@@ -1,10 +1,9 @@
-// Files that tests make: a temporary folder and .npz archives.
+// Files that tests make: texts and .npz archives.
 #pragma once
 
 #include <zip.h>
 
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <string>
@@ -12,23 +11,11 @@
 
 #include "gtest/gtest.h"
 #include "toolchain/error.h"
+#include "toolchain/temporary_folder.h"
 
 namespace figurine::body::test {
 
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name =
-        (std::filesystem::temp_directory_path() / "figurine_body_test_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
+using testing_tools::TemporaryFolder;
 
 inline void write_text(const std::string& path, const std::string& text) {
   std::ofstream(path, std::ios::binary) << text;

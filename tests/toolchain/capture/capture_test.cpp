@@ -15,26 +15,14 @@
 #include "toolchain/body/texel_body.h"
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/error.h"
+#include "toolchain/temporary_folder.h"
 
 namespace figurine::capture {
 namespace {
 
 namespace fs = std::filesystem;
 
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "figurine_capture_test_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() { fs::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  std::string path() const { return path_.string(); }
-
- private:
-  fs::path path_;
-};
+using testing_tools::TemporaryFolder;
 
 const Package& mannequin() {
   static const TemporaryFolder folder;

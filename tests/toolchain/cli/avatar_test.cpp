@@ -1,8 +1,9 @@
 // figurine-train avatar --resume keeps the run's number of threads, or says that it does not; what
-// all commands have with --threads.
+// all commands have with --threads; whose threads the device's networks run on.
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 
 #include "gtest/gtest.h"
@@ -67,6 +68,19 @@ TEST(ThreadsOption, AboveTheUsableCpusIsLoweredWithALineUnlessForced) {
   EXPECT_EQ(std::count(lowered.err.begin(), lowered.err.end(), '\n'), 1) << lowered.err;
   for (const char* bad : {"1000", "many", "-1", "1000 --force-threads"})
     EXPECT_EQ(train(folder, std::string("--resume --threads ") + bad).exit_code, 2) << bad;
+}
+
+// By what the dynamic linker says of itself: XNNPACK's loops are the program's own, not the
+// system's.
+TEST(Threads, NetworksRunOnThoseThatGiveWay) {
+  const TestFolder folder;
+  const ProgramRun run = tests::run_shell("LD_DEBUG=bindings " FIGURINE_TRAIN
+                                          " --version 2>&1 | grep 'libXNNPACK.* `pthreadpool_'",
+                                          folder);
+  EXPECT_NE(run.out.find("`pthreadpool_parallelize_1d'"), std::string::npos) << run.out;
+  std::istringstream lines(run.out);
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_NE(line.find("/figurine-train [0]: "), std::string::npos) << line;
 }
 
 }  // namespace

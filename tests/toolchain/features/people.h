@@ -1,9 +1,6 @@
 // Small synthetic populations on disk.
 #pragma once
 
-#include <unistd.h>
-
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -12,23 +9,11 @@
 #include "ports/host/files.h"
 #include "runtime/test_packages.h"
 #include "toolchain/error.h"
+#include "toolchain/temporary_folder.h"
 
 namespace figurine::features::test {
 
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name =
-        (std::filesystem::temp_directory_path() / "figurine_evaluate_test_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
+using testing_tools::TemporaryFolder;
 
 // How many members of every part, and from where on their weights are others.
 struct PeopleOptions {

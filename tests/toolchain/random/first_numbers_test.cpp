@@ -31,6 +31,7 @@ TEST(FirstNumbers, OfTraining) {
   EXPECT_EQ(random_bits(1, 2, 3), 0x8568f7c4e53b5a35u);
   EXPECT_EQ(random_bits(7, 201, uint64_t{1} << 40), 0x79603acb4f452ae2u);
   EXPECT_EQ(random_unit(1, 2, 3), 0x1.0ad1eep-1f);
+  EXPECT_NEAR(random_normal(7, 201, 3), 0x1.48c7517398c8ap+0, 1e-15);  // as of captures, below
 }
 
 TEST(FirstNumbers, OfTheOrderOfTraining) {

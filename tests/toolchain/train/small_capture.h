@@ -16,26 +16,10 @@
 #include "toolchain/body/texel_body.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/error.h"
+#include "toolchain/temporary_folder.h"
 #include "toolchain/train/package_file.h"
 
 namespace figurine::testing_tools {
-
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "figurine_train_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  std::string path(const std::string& name = "") const {
-    return (name.empty() ? path_ : path_ / name).string();
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 struct SmallCapture {
   TemporaryFolder folder;

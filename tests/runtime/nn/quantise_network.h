@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "figurine/fixed_point.h"
-#include "runtime/reference_network.h"
+#include "runtime/nn/reference_network.h"
 
 namespace figurine::tests {
 

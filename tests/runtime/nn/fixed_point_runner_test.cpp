@@ -10,7 +10,7 @@
 #include <numeric>
 #include <vector>
 
-#include "runtime/fixed_point_networks.h"
+#include "runtime/nn/fixed_point_networks.h"
 
 namespace figurine {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "largest_error.h"
-#include "runtime/reference_network.h"
+#include "runtime/nn/reference_network.h"
 #include "runtime/test_packages.h"
 
 namespace figurine {

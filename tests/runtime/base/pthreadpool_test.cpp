@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "runtime/src/base/thread_pool.h"
+#include "runtime/src/nn/xnnpack_graph.h"
 
 namespace figurine {
 namespace {
@@ -199,6 +200,15 @@ TEST(Pthreadpool, TakesThePlaceOfTheSystems) {
     ASSERT_NE(::dladdr(function, &found), 0);
     EXPECT_EQ(found.dli_fbase, here.dli_fbase) << name;
   }
+}
+
+// Where its loops are another library's it is given none (tests/consumer).
+TEST(Pthreadpool, XnnpackIsGivenTheRuntimesPool) {
+  ASSERT_TRUE(initialize_xnnpack().ok());
+  const Result<ThreadPool> pool = ThreadPool::create(3);
+  ASSERT_TRUE(pool.ok());
+  ASSERT_NE(pool->network_pool(), nullptr);
+  EXPECT_EQ(xnnpack_pool(*pool), pool->network_pool());
 }
 
 TEST(Pthreadpool, DenormalsAreOffWhereItIsAskedAndBackAfterwards) {

@@ -13,7 +13,7 @@
 #include "figurine/avatar_sampler.h"
 #include "figurine/package.h"
 #include "formats/package_samples.h"
-#include "runtime/random_sampler.h"
+#include "runtime/sample/random_sampler.h"
 #include "runtime/src/sample/device_transformer.h"
 #include "runtime/src/sample/integer_linear.h"
 #include "runtime/src/sample/weight_decoder.h"
@@ -341,6 +341,7 @@ TEST_F(AvatarSamplerTest, ASeedIsOneAvatarAndAnotherIsAnother) {
 
 TEST_F(AvatarSamplerTest, AnInstructionSetIsChosenOrRefused) {
   const auto expected = hash_of({.seed = 1});
+  EXPECT_EQ(sampler_->isa(), supported_isas().back());
   for (const Isa isa : {Isa::kBaseline, Isa::kNeon, Isa::kSse41, Isa::kAvx2, Isa::kAvx512}) {
     const std::span<const Isa> supported = supported_isas();
     auto created = AvatarSampler::create(random_.view, isa);
@@ -349,6 +350,7 @@ TEST_F(AvatarSamplerTest, AnInstructionSetIsChosenOrRefused) {
       continue;
     }
     ASSERT_TRUE(created.ok()) << created.status().message();
+    EXPECT_EQ((*created)->isa(), isa);
     sampler_ = std::move(*created);
     EXPECT_EQ(hash_of({.seed = 1}), expected) << to_string(isa);
   }
