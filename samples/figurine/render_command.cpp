@@ -22,7 +22,7 @@ namespace {
 struct RenderOptions {
   SceneOptions scene;
   DeviceOptions device;
-  std::string frames, camera, size, background, follow = "smooth";
+  std::string frames, camera, size, background, follow = "smooth", framing = "body";
   std::optional<float> near_m;
   std::optional<double> frames_per_second;
   std::string output, contact_sheet;
@@ -74,6 +74,9 @@ Result<Job> prepare(const RenderOptions& options) {
     if (!size.ok()) return size.status();
     camera_path.size = *size;
   }
+  const Result<Framing> framing = parse_framing(options.framing);
+  if (!framing.ok()) return framing.status();
+  camera_path.framing = *framing;
   if (!options.camera.empty()) {
     const Result<CameraSpec> camera = parse_camera_spec(options.camera);
     if (!camera.ok()) return camera.status();
@@ -197,6 +200,13 @@ Command add_render_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--camera", options->camera,
                       "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
+  command
+      ->add_option(
+          "--framing", options->framing,
+          "what of the figures the picture holds: body, bust (head and shoulders) or head; "
+          "an orbit is about its middle")
+      ->check(CLI::IsMember({"body", "bust", "head"}))
+      ->capture_default_str();
   command
       ->add_option(
           "--follow", options->follow,

@@ -231,6 +231,13 @@ TEST_F(Cli, TheCameraThatJsonPrintsCanBeGivenBack) {
   EXPECT_EQ(pfm("c.pfm").width_px, 32u);
 }
 
+TEST_F(Cli, FramingIsRefusedWhereItCannotBe) {
+  expect_refused("render P/avatar.fgn --framing bust -o x.png", 1,
+                 "framing: body 'jointed cylinder' has no joint called head");
+  EXPECT_EQ(run("render P/avatar.fgn --framing feet -o x.png").exit_code, 2);
+  EXPECT_EQ(run("render P/avatar.fgn --framing body --size 64x64 -o x.png").exit_code, 0);
+}
+
 TEST_F(Cli, SeveralAvatarsStandSideBySide) {
   ASSERT_EQ(run("render P/avatar.fgn --size 120x60 -o one.png").exit_code, 0);
   ASSERT_EQ(run("render P/avatar.fgn P/avatar.fgn --spacing 1.5 --camera orbit:0,0,6 --size 120x60 "
