@@ -22,6 +22,7 @@ namespace {
 struct RenderOptions {
   SceneOptions scene;
   DeviceOptions device;
+  Approximation approximation;
   std::string frames, camera, size, background, follow = "smooth", framing = "body";
   std::optional<float> near_m;
   std::optional<double> frames_per_second;
@@ -137,7 +138,8 @@ Status run_render(const RenderOptions& options) {
     const uint64_t frame_start_ns = ports::now_ns();
     FIG_RETURN_IF_ERROR((*renderer)->render({.camera = (*cameras)[i],
                                              .avatars = job->scene.pose(job->frames[i]),
-                                             .background = job->background},
+                                             .background = job->background,
+                                             .approximation = options.approximation},
                                             frame.target()));
     log.add((*renderer)->statistics(), ports::now_ns() - frame_start_ns);
     if (sink) FIG_RETURN_IF_ERROR(sink->add(frame));
@@ -159,6 +161,7 @@ Status run_render(const RenderOptions& options) {
     json["frames_per_second"] =
         1000 / std::max(log.total_ms().median, 1e-6);  // of rendering, by the median frame
     json["frames_per_second_with_output"] = frame_count / std::max(wall_s, 1e-9);
+    json["network_below_px"] = options.approximation.network_below_px;
     json["stages_ms"] = log.stages_json();
     json["work"] = log.work_json();
     json["renderer_memory_bytes"] = (*renderer)->memory_bytes();
@@ -238,6 +241,7 @@ Command add_render_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("-o,--output", options->output, "x.png, x_%04d.png, x.pfm, x.y4m or x.mp4");
   options->device.add_to(*command);
+  add_options(*command, options->approximation);
   return {command, [options] { return run_render(*options); }};
 }
 
