@@ -87,13 +87,15 @@ Json describe_body(const Body& body) {
                       {"parent", body.parents[j]},
                       {"rest_position_m", numbers(body.joint_position_m.subspan(j * 3, 3))}});
   }
-  return {{"uv_size", body.uv_size},
-          {"covered_texels", body.texel_count()},
-          {"border_texels", body.border_texel.size()},
-          {"shape_coefficients", body.shape_count()},
-          {"rest_extent_m", {{"min", numbers(low)}, {"max", numbers(high)}}},
-          {"left_arm_below_horizontal_deg", left_arm_below_horizontal(body)},
-          {"joints", joints}};
+  Json out = {{"uv_size", body.uv_size},
+              {"covered_texels", body.texel_count()},
+              {"border_texels", body.border_texel.size()},
+              {"shape_coefficients", body.shape_count()},
+              {"rest_extent_m", {{"min", numbers(low)}, {"max", numbers(high)}}},
+              {"left_arm_below_horizontal_deg", left_arm_below_horizontal(body)},
+              {"joints", joints}};
+  if (!body.texel_triangle.empty()) out["mesh_places"] = true;
+  return out;
 }
 
 Json describe_motion(const Motion& motion) {

@@ -76,6 +76,8 @@ void print_body(Page& page, const Json& body) {
   page.heading("body");
   page.line("map", std::format("{0}x{0} texels, {1} covered, {2} border", text_of(body["uv_size"]),
                                text_of(body["covered_texels"]), text_of(body["border_texels"])));
+  if (body.contains("mesh_places"))
+    page.line("layout", "not the mesh's own: every texel states its place on the mesh");
   page.line("shape", text_of(body["shape_coefficients"]) + " coefficients");
   const Json &low = body["rest_extent_m"]["min"], &high = body["rest_extent_m"]["max"];
   std::string rest =

@@ -26,8 +26,10 @@ struct SmallCapture {
   std::string body = folder.path("mannequin.fgn");
   std::string data = folder.path("capture") + "/" + capture::identity_name(0);
 
-  SmallCapture() {
-    const body::TexelBody texels = body::make_texel_body(body::make_mannequin(), 32);
+  // On the mannequin in its own layout.
+  SmallCapture() : SmallCapture(body::make_texel_body(body::make_mannequin(), 32)) {}
+
+  explicit SmallCapture(const body::TexelBody& texels) {
     const auto bytes = value_or_throw(write_package(texels.view(), {.tool = "test"}), body);
     throw_if_error(ports::write_file_atomically(body, bytes), body);
     const train::PackageFile package = train::open_package(body, PackageKind::kBody);
