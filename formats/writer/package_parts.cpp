@@ -43,6 +43,16 @@ class PartList {
     blobs_.push_back(std::move(part));
   }
 
+  // As add, and a reader that does not know the name may skip it.
+  template <class T>
+  void add_optional(const std::string& name, std::span<const T> values,
+                    const std::vector<uint32_t>& inner, size_t expected_first) {
+    if (values.empty()) return;
+    const size_t before = blobs_.size();
+    add(name, values, inner, expected_first);
+    if (blobs_.size() > before) blobs_.back().optional = true;
+  }
+
   const Status& status() const { return status_; }
 
  private:
@@ -135,6 +145,8 @@ Result<PackageParts> take_apart(const Body& body, const Provenance& provenance) 
   list.add("body.texel_shape_basis", body.texel_shape_basis_m, {texels, 3});
   list.add("body.border_texel", body.border_texel);
   list.add("body.border_source", body.border_source, {}, body.border_texel.size());
+  list.add_optional("body.texel_triangle", body.texel_triangle, {}, texels);
+  list.add_optional("body.texel_barycentric", body.texel_barycentric, {3}, texels);
   if (!list.status().ok()) return list.status();
   return parts;
 }

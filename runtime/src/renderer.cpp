@@ -67,8 +67,10 @@ struct Renderer::Impl {
   Status validate(const Frame& frame, const ImageTarget& target, uint32_t& blocks) const;
   Status validate_avatar(AvatarId id, const PoseView& pose) const;
   Result<std::shared_ptr<SharedBody>> blocks_of(const Body& body) const;
-  Status add(const FrameAvatar& seen, const kernels::View& view, const LeaveOut& leave_out,
+  Status add(const FrameAvatar& seen, const kernels::View& view, const Frame& frame,
              StageClock& clock, FrameStatistics& statistics);
+  // Of another avatar of the body; null if none has it.
+  std::shared_ptr<const BodyGrid> grid_of(const SharedBody& body, uint32_t size) const;
 
   std::vector<AddedAvatar>::const_iterator find(AvatarId id) const;  // end() if there is none
   PosedAvatar& avatar(AvatarId id) const { return *find(id)->posed; }
@@ -95,6 +97,9 @@ Status Renderer::Impl::validate(const Frame& frame, const ImageTarget& target,
   }
   if (!(frame.splat.alpha_cut > 0 && frame.splat.alpha_cut <= 0.5f))
     return invalid("alpha cut: must be above 0 and at most 0.5");
+  const float below_px = frame.approximation.network_below_px;
+  if (!(below_px >= 0) || !std::isfinite(below_px))
+    return invalid("network_below_px: must be finite and not negative");
   if (frame.background) {
     for (float channel : *frame.background) {
       if (!std::isfinite(channel)) return invalid("background: must be finite");
@@ -143,11 +148,25 @@ Result<std::shared_ptr<Renderer::Impl::SharedBody>> Renderer::Impl::blocks_of(
   return shared;
 }
 
-Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view,
-                           const LeaveOut& leave_out, StageClock& clock,
-                           FrameStatistics& of_frame) {
+std::shared_ptr<const BodyGrid> Renderer::Impl::grid_of(const SharedBody& body,
+                                                        uint32_t size) const {
+  for (const AddedAvatar& added : avatars) {
+    const std::shared_ptr<const BodyGrid>& grid = added.posed->grid();
+    if (added.body.get() == &body && grid != nullptr && grid->size() == size) return grid;
+  }
+  return nullptr;
+}
+
+Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view, const Frame& frame,
+                           StageClock& clock, FrameStatistics& of_frame) {
   PosedAvatar& posed = avatar(seen.avatar);
-  FIG_RETURN_IF_ERROR(posed.pose(seen.pose, &view, leave_out, scratch, clock));
+  const Result<NetworkUse> use = posed.pose({.pose = seen.pose,
+                                             .avatar = seen.avatar,
+                                             .view = &view,
+                                             .leave_out = frame.leave_out,
+                                             .approximation = frame.approximation},
+                                            scratch, clock);
+  if (!use.ok()) return use.status();
   const std::span<const uint32_t> wanted = scratch.wanted_blocks();
   rasterizer.add(static_cast<uint32_t>(wanted.size()), posed.sh_degree(), Stage::kDecode, clock,
                  [&](uint32_t i, kernels::GaussianBlock& block) {
@@ -160,7 +179,10 @@ Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view,
       of_frame.left_out.hidden_texels += lanes_of_block(i, posed.body().texel_count());
     }
   }
-  of_frame.macs += wanted.empty() ? 0 : posed.macs();
+  of_frame.macs += *use == NetworkUse::kRun ? posed.macs() : 0;
+  of_frame.networks += *use == NetworkUse::kRun ? 1 : 0;
+  of_frame.stale_networks += *use == NetworkUse::kStale ? 1 : 0;
+  of_frame.left_out.unchanged_networks += *use == NetworkUse::kUnchanged ? 1 : 0;
   return {};
 }
 
@@ -199,10 +221,6 @@ Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
     return Status(StatusCode::kMismatch,
                   std::string("a body is wanted, not a ") + to_string(body.kind()));
   FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar, body));
-  if (!avatar.static_part.empty() || avatar.texels_a_side() != avatar.network.input_size) {
-    return Status(StatusCode::kUnsupported,
-                  "avatar: a static part, or a network coarser than the texels, is not drawn yet");
-  }
   if (impl_->next_id == std::numeric_limits<uint32_t>::max())
     return Status(StatusCode::kLimitExceeded, "avatars: no further id");
   const Result<std::shared_ptr<Impl::SharedBody>> shared = impl_->blocks_of(body.body());
@@ -219,7 +237,8 @@ Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
   }
   if (added.posed == nullptr) {
     Result<std::unique_ptr<PosedAvatar>> posed = PosedAvatar::create(
-        avatar, body.body(), blocks, precision.value_or(held), *impl_->pool, impl_->kernels);
+        avatar, body.body(), blocks, impl_->grid_of(**shared, avatar.network.input_size),
+        precision.value_or(held), *impl_->pool, impl_->kernels);
     if (!posed.ok()) return posed.status();
     added.posed = std::move(posed).value();
   }
@@ -253,7 +272,7 @@ Status Renderer::render(const Frame& frame, const ImageTarget& target) {
   StageClock clock(impl.now_ns, impl.now_user);
   FrameStatistics statistics;
   for (const FrameAvatar& seen : frame.avatars) {
-    FIG_RETURN_IF_ERROR(impl.add(seen, view, frame.leave_out, clock, statistics));
+    FIG_RETURN_IF_ERROR(impl.add(seen, view, frame, clock, statistics));
   }
   for (const GaussianView& gaussians : frame.gaussians) impl.rasterizer.add(gaussians, clock);
   impl.rasterizer.draw(target, frame.background, clock);
@@ -271,7 +290,8 @@ Result<GaussianView> Renderer::pose_avatar(AvatarId id, const PoseView& pose) {
   if (!impl_->gaussians.ensure(count, posed.sh_degree()))
     return out_of_memory("an avatar's Gaussians");
   StageClock clock;
-  FIG_RETURN_IF_ERROR(posed.pose(pose, nullptr, {}, impl_->scratch, clock));
+  const Result<NetworkUse> use = posed.pose({.pose = pose}, impl_->scratch, clock);
+  if (!use.ok()) return use.status();
   kernels::GaussianBlock block;
   for (uint32_t i = 0; i < posed.block_count(); ++i) {
     const uint32_t lanes = posed.decode(impl_->scratch, i, block);
@@ -295,6 +315,10 @@ uint64_t Renderer::memory_bytes() const {
       bytes += added->body->blocks.memory_bytes();
     if (!counted([&](const auto& other) { return other.posed == added->posed; }))
       bytes += added->posed->memory_bytes();
+    const BodyGrid* const grid = added->posed->grid().get();
+    if (grid != nullptr &&
+        !counted([&](const auto& other) { return other.posed->grid().get() == grid; }))
+      bytes += grid->memory_bytes();
   }
   return bytes;
 }

@@ -1,32 +1,41 @@
 #include "samples/common/camera_path.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-
-#include "samples/common/framing.h"
 
 namespace figurine::samples {
 
 namespace {
 
 constexpr double kRadians = 3.14159265358979323846 / 180;
-constexpr size_t kFramingFrames = 5;    // posed to see how large the figures are
-constexpr double kFollowSigma_s = 0.4;  // smoothing of the followed path: about a step
+constexpr size_t kFramingFrames = 5;  // posed to see how large the figures are
+// Of body, bust and head: smoothing of the followed path, about a step; heads leave a close-up
+// sooner.
+constexpr std::array<double, 3> kFollowSigma_s{0.4, 0.2, 0.2};
 constexpr float kOpacitySeen =
     0.05f;  // fainter Gaussians do not decide what must be in the picture
 constexpr float kDefaultTurn_deg = 25;  // a three-quarter view shows more shape than a frontal one
-constexpr float kDefaultElevation_deg = 6;
-constexpr float kDefaultFov_deg = 35;
+// Of body, bust and head. Close-ups are level with the eyes, and from as far as somebody across a
+// table: nearer, a nose grows.
+constexpr std::array<float, 3> kDefaultElevation_deg{6, 0, 0};
+constexpr std::array<float, 3> kDefaultFov_deg{35, 25, 20};
 
-// Mean ground position of everybody in each frame.
-std::vector<std::array<float, 2>> ground_path(std::span<const uint32_t> frames, Scene& scene) {
-  std::vector<std::array<float, 2>> path;
+// What is followed: in each frame the mean place of everybody's root joint on the ground, or of
+// everybody's head.
+std::vector<Point> figures_path(std::span<const uint32_t> frames, Framing framing, Scene& scene) {
+  std::vector<Point> path;
   for (const uint32_t frame : frames) {
     scene.pose(frame);
-    std::array<float, 2> mean{0, 0};
+    Point mean{0, 0, 0};
     for (size_t m = 0; m < scene.size(); ++m) {
-      mean[0] += scene.root_m(m)[0] / static_cast<float>(scene.size());
-      mean[1] += scene.root_m(m)[2] / static_cast<float>(scene.size());
+      Point place = scene.root_m(m);
+      if (framing == Framing::kBody) {
+        place[1] = 0;
+      } else {  // framed_joints: the head is the first, and there
+        place = scene.joint_m(m, framed_joints(scene.body(m).package.body(), framing)->front());
+      }
+      for (size_t k = 0; k < 3; ++k) mean[k] += place[k] / static_cast<float>(scene.size());
     }
     path.push_back(mean);
   }
@@ -43,25 +52,53 @@ float mean_heading_deg(const Scene& scene) {
   return static_cast<float>(std::atan2(x, z) / kRadians);
 }
 
-// Centres of the Gaussians that can be seen in a few of the frames, relative to path.
+// Which of a figure's Gaussians, one a texel, belong to what is framed.
+std::vector<bool> framed_texels(const Body& body, Framing framing) {
+  std::vector<bool> framed(body.texel_count(), true);
+  if (framing == Framing::kBody) return framed;
+  const std::vector<uint8_t> joints = *framed_joints(body, framing);
+  for (uint32_t i = 0; i < body.texel_count(); ++i) framed[i] = moved_most_by(body, i, joints);
+  return framed;
+}
+
+// Centres of the framed Gaussians that can be seen in a few of the frames, relative to path.
 Result<std::vector<Point>> sample_points(std::span<const uint32_t> frames,
-                                         std::span<const std::array<float, 2>> path, Scene& scene,
+                                         std::span<const Point> path, Framing framing, Scene& scene,
                                          Renderer& renderer) {
+  std::vector<std::vector<bool>> framed;  // of each figure
+  for (size_t m = 0; m < scene.size(); ++m)
+    framed.push_back(framed_texels(scene.body(m).package.body(), framing));
   std::vector<Point> points;
   const size_t samples = std::min(kFramingFrames, frames.size());
   for (size_t s = 0; s < samples; ++s) {
     const size_t at = samples == 1 ? 0 : s * (frames.size() - 1) / (samples - 1);
-    for (const FrameAvatar& member : scene.pose(frames[at])) {
-      const Result<GaussianView> gaussians = renderer.pose_avatar(member.avatar, member.pose);
+    const std::span<const FrameAvatar> posed = scene.pose(frames[at]);
+    for (size_t m = 0; m < posed.size(); ++m) {
+      const Result<GaussianView> gaussians = renderer.pose_avatar(posed[m].avatar, posed[m].pose);
       if (!gaussians.ok()) return gaussians.status();
       for (uint32_t i = 0; i < gaussians->count; ++i) {
-        if (!(gaussians->opacity[i] >= kOpacitySeen)) continue;
+        if (!framed[m][i] || !(gaussians->opacity[i] >= kOpacitySeen)) continue;
         const float* p = &gaussians->position_m[3 * size_t(i)];
-        points.push_back({p[0] - path[at][0], p[1], p[2] - path[at][1]});
+        points.push_back({p[0] - path[at][0], p[1] - path[at][1], p[2] - path[at][2]});
       }
     }
   }
   return points;
+}
+
+// The camera that the options name, at the size asked for.
+Result<Camera> fixed_camera(const CameraPathOptions& options, const Camera& golden) {
+  if (options.framing != Framing::kBody) {
+    return Status(StatusCode::kInvalidArgument,
+                  "framing: a camera from a file frames by itself; give one or the other");
+  }
+  ImageSize size{options.camera.fixed->width_px, options.camera.fixed->height_px};
+  if (size.width_px == 0) size = {golden.width_px, golden.height_px};
+  Result<Camera> sized = resize_camera(*options.camera.fixed, options.size.value_or(size));
+  if (!sized.ok()) return sized;
+  if (options.near_m) sized->near_m = *options.near_m;
+  FIG_RETURN_IF_ERROR(validate_camera(*sized));
+  return sized;
 }
 
 }  // namespace
@@ -71,42 +108,47 @@ Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
                                              Renderer& renderer) {
   const Camera& golden = scene.avatar(0).avatar.golden.camera;
   if (options.camera.fixed) {
-    Camera camera = *options.camera.fixed;
-    ImageSize size{camera.width_px, camera.height_px};
-    if (size.width_px == 0) size = {golden.width_px, golden.height_px};
-    Result<Camera> sized = resize_camera(camera, options.size.value_or(size));
-    if (!sized.ok()) return sized.status();
-    if (options.near_m) sized->near_m = *options.near_m;
-    FIG_RETURN_IF_ERROR(validate_camera(*sized));
-    return std::vector<Camera>(frames.size(), *sized);
+    const Result<Camera> camera = fixed_camera(options, golden);
+    if (!camera.ok()) return camera.status();
+    return std::vector<Camera>(frames.size(), *camera);
+  }
+  if (options.framing != Framing::kBody) {
+    for (size_t m = 0; m < scene.size(); ++m) {
+      const Result<std::vector<uint8_t>> joints =
+          framed_joints(scene.body(m).package.body(), options.framing);
+      if (!joints.ok()) return joints.status();
+    }
   }
   const ImageSize size = options.size.value_or(ImageSize{golden.width_px, golden.height_px});
   const double aspect = static_cast<double>(size.width_px) / size.height_px;
-  std::vector<std::array<float, 2>> path(
-      frames.size(), {0, 0});  // an orbit that stays sees the path in world coordinates
+  std::vector<Point> path(frames.size(),
+                          {0, 0, 0});  // an orbit that stays sees the path in world coordinates
   if (options.follow)
-    path = smooth_path(ground_path(frames, scene),
-                       kFollowSigma_s * scene.frames_per_second() /
+    path = smooth_path(figures_path(frames, options.framing, scene),
+                       kFollowSigma_s[static_cast<size_t>(options.framing)] *
+                           scene.frames_per_second() /
                            (frames.size() > 1 ? frames[1] - frames[0] : 1));
-  const Result<std::vector<Point>> points = sample_points(frames, path, scene, renderer);
+  const Result<std::vector<Point>> points =
+      sample_points(frames, path, options.framing, scene, renderer);
   if (!points.ok()) return points.status();
 
   FramingOptions framing;
   const Point centre = robust_centre(*points, framing.share);
   OrbitCamera orbit = options.camera.orbit.value_or(OrbitCamera{});
-  orbit.target_m = options.follow ? Point{0, centre[1], 0} : centre;
+  // Whole figures turn about their root; a face is where it is.
+  const bool about_root = options.follow && options.framing == Framing::kBody;
+  orbit.target_m = about_root ? Point{0, centre[1], 0} : centre;
   if (!options.camera.orbit) {
     scene.pose(frames[0]);
     orbit.azimuth_deg = mean_heading_deg(scene) + kDefaultTurn_deg;
-    orbit.elevation_deg = kDefaultElevation_deg;
-    orbit.vertical_fov_deg = kDefaultFov_deg;
+    orbit.elevation_deg = kDefaultElevation_deg[static_cast<size_t>(options.framing)];
+    orbit.vertical_fov_deg = kDefaultFov_deg[static_cast<size_t>(options.framing)];
     orbit.distance_m = fit_distance_m(*points, orbit, aspect, framing);
   }
   std::vector<Camera> cameras;
   for (size_t i = 0; i < frames.size(); ++i) {
     OrbitCamera here = orbit;
-    here.target_m[0] += path[i][0];
-    here.target_m[2] += path[i][1];
+    for (size_t k = 0; k < 3; ++k) here.target_m[k] += path[i][k];
     Result<Camera> camera = make_orbit_camera(here, size.width_px, size.height_px);
     if (!camera.ok()) return camera.status();
     if (options.near_m) camera->near_m = *options.near_m;

@@ -7,6 +7,7 @@
 
 #include "figurine/renderer.h"
 #include "samples/common/camera_spec.h"
+#include "samples/common/framing.h"
 #include "samples/common/scene.h"
 
 namespace figurine::samples {
@@ -14,14 +15,16 @@ namespace figurine::samples {
 struct CameraPathOptions {
   CameraSpec camera;
   std::optional<ImageSize>
-      size;            // without: the JSON camera's, else the golden frame's of the first avatar
+      size;  // without: the JSON camera's, else the golden frame's of the first avatar
+  Framing framing = Framing::kBody;  // what an orbit camera aims at, and what has to fit
   bool follow = true;  // orbit cameras move with the figures' smoothed path; otherwise they see the
                        // whole path from one place
   std::optional<float> near_m;
 };
 
-// The scene must have been added to the renderer, which poses it in a few frames to see how large
-// it is. frames is not empty.
+// kUnsupported for a close-up of a body without a head joint, kInvalidArgument for one with a
+// camera that a file fixes. The scene must have been added to the renderer, which poses it in a few
+// frames to see how large it is. frames is not empty.
 Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
                                              std::span<const uint32_t> frames, Scene& scene,
                                              Renderer& renderer);

@@ -44,6 +44,14 @@ void DeviceOptions::add_to(CLI::App& app, bool json_flag) {
   if (json_flag) app.add_flag("--json", json, "print a summary as JSON to standard output");
 }
 
+void add_options(CLI::App& app, Approximation& approximation) {
+  app.add_option("--network-below-px", approximation.network_below_px,
+                 "figures whose box in the image is smaller than this many pixels keep what their "
+                 "network said of an earlier pose; 0: never")
+      ->check(CLI::Range(0.0f, 65536.0f))
+      ->capture_default_str();
+}
+
 Result<RendererOptions> DeviceOptions::renderer_options() const {
   if (!precision.empty() && !network_precision()) {
     return Status(StatusCode::kUnsupported,

@@ -39,6 +39,9 @@ void add_isa_option(CLI::App& app, std::string& isa);
 // the same bits with every one. kUnsupported for what is not there.
 Result<Isa> instruction_set(const std::string& isa);
 
+// What a command may leave out although it shows.
+void add_options(CLI::App& app, Approximation& approximation);
+
 // Renderer::create, with a line on standard error where the system gives fewer threads than asked
 // for.
 Result<std::unique_ptr<Renderer>> make_renderer(const RendererOptions& options);

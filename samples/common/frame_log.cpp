@@ -33,6 +33,9 @@ void FrameLog::add(const FrameStatistics& statistics, uint64_t total_ns) {
   pairs_.push_back(static_cast<double>(statistics.pairs));
   blends_.push_back(static_cast<double>(statistics.blends));
   macs_.push_back(static_cast<double>(statistics.macs));
+  networks_ += statistics.networks;
+  unchanged_networks_ += statistics.left_out.unchanged_networks;
+  stale_networks_ += statistics.stale_networks;
 }
 
 Summary FrameLog::stages_ms(std::span<const Stage> stages) const {
@@ -59,11 +62,17 @@ nlohmann::ordered_json FrameLog::work_json() const {
   const auto count = [](const std::vector<double>& values) {
     return static_cast<uint64_t>(std::llround(summarise(values).median));
   };
+  const auto per_frame = [&](uint64_t sum) {
+    return static_cast<double>(sum) / static_cast<double>(std::max<size_t>(frames(), 1));
+  };
   return {{"gaussians", count(gaussians_)},
           {"visible", count(visible_)},
           {"pairs", count(pairs_)},
           {"blends", count(blends_)},
-          {"macs", count(macs_)}};
+          {"macs", count(macs_)},
+          {"networks", per_frame(networks_)},
+          {"unchanged_networks", per_frame(unchanged_networks_)},
+          {"stale_networks", per_frame(stale_networks_)}};
 }
 
 }  // namespace figurine::samples

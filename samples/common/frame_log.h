@@ -27,13 +27,15 @@ class FrameLog {
 
   // {"total": {"median": ms, "p90": ms}, "maps": {...}, ...}, in the order of the stages.
   nlohmann::ordered_json stages_json() const;
-  // Medians of Gaussians, visible, pairs, blends and macs.
+  // Medians of Gaussians, visible, pairs, blends and macs; means of runs of networks and of those
+  // that were left out.
   nlohmann::ordered_json work_json() const;
 
  private:
   std::vector<double> total_ms_;
   std::vector<double> stage_ms_[kStageCount];
   std::vector<double> gaussians_, visible_, pairs_, blends_, macs_;
+  uint64_t networks_ = 0, unchanged_networks_ = 0, stale_networks_ = 0;
 };
 
 }  // namespace figurine::samples

@@ -24,6 +24,40 @@ bool finite(const Point& point) {
 
 }  // namespace
 
+Result<Framing> parse_framing(const std::string& text) {
+  if (text == "body") return Framing::kBody;
+  if (text == "bust") return Framing::kBust;
+  if (text == "head") return Framing::kHead;
+  return Status(StatusCode::kInvalidArgument,
+                "framing: '" + text + "' is none of body, bust, head");
+}
+
+Result<std::vector<uint8_t>> framed_joints(const Body& body, Framing framing) {
+  constexpr std::array<const char*, 7> kNames{"head",        "jaw",  "left_eye",    "right_eye",
+                                              "left_collar", "neck", "right_collar"};
+  const size_t names = framing == Framing::kBust ? kNames.size() : 4;
+  std::vector<uint8_t> joints;
+  for (size_t i = 0; i < names; ++i) {
+    const auto found = std::find(body.joint_names.begin(), body.joint_names.end(), kNames[i]);
+    if (found != body.joint_names.end()) {
+      joints.push_back(static_cast<uint8_t>(found - body.joint_names.begin()));
+    } else if (i == 0) {
+      return Status(StatusCode::kUnsupported,
+                    "framing: body '" + body.name + "' has no joint called head");
+    }
+  }
+  return joints;
+}
+
+bool moved_most_by(const Body& body, uint32_t texel, std::span<const uint8_t> joints) {
+  const float* weights = &body.texel_weights[size_t(texel) * kSkinInfluences];
+  const uint8_t joint =
+      body.texel_joints[size_t(texel) * kSkinInfluences +
+                        static_cast<size_t>(std::max_element(weights, weights + kSkinInfluences) -
+                                            weights)];
+  return std::find(joints.begin(), joints.end(), joint) != joints.end();
+}
+
 float fit_distance_m(std::span<const Point> points, const OrbitCamera& orbit, double aspect,
                      const FramingOptions& options) {
   constexpr double kRadians = 3.14159265358979323846 / 180;
@@ -65,26 +99,25 @@ Point robust_centre(std::span<const Point> points, double share) {
   return centre;
 }
 
-std::vector<std::array<float, 2>> smooth_path(std::span<const std::array<float, 2>> path,
-                                              double sigma_frames) {
-  std::vector<std::array<float, 2>> result(path.begin(), path.end());
+std::vector<Point> smooth_path(std::span<const Point> path, double sigma_frames) {
+  std::vector<Point> result(path.begin(), path.end());
   if (!(sigma_frames > 0)) return result;
   const auto reach = static_cast<int64_t>(std::ceil(3 * sigma_frames)),
              count = static_cast<int64_t>(path.size());
   for (int64_t i = 0; i < count; ++i) {
-    double weights = 0, first = 0, second = 0, value[2] = {0, 0}, slope[2] = {0, 0};
+    double weights = 0, first = 0, second = 0, value[3] = {0, 0, 0}, slope[3] = {0, 0, 0};
     for (int64_t j = std::max<int64_t>(0, i - reach); j <= std::min(count - 1, i + reach); ++j) {
       const double d = static_cast<double>(j - i) / sigma_frames, weight = std::exp(-0.5 * d * d);
       weights += weight;
       first += weight * d;
       second += weight * d * d;
-      for (int k = 0; k < 2; ++k) {
+      for (int k = 0; k < 3; ++k) {
         value[k] += weight * path[static_cast<size_t>(j)][k];
         slope[k] += weight * d * path[static_cast<size_t>(j)][k];
       }
     }
     const double determinant = weights * second - first * first;
-    for (int k = 0; k < 2; ++k) {
+    for (int k = 0; k < 3; ++k) {
       const double smooth = determinant > 1e-12 * weights * weights
                                 ? (second * value[k] - first * slope[k]) / determinant
                                 : value[k] / weights;

@@ -10,16 +10,15 @@ namespace figurine::samples {
 
 namespace {
 
-// Rest position of the root joint of the person's own template.
-std::array<float, 3> rest_root(const Avatar& avatar, const Body& body) {
-  std::array<float, 3> root{body.joint_position_m[0], body.joint_position_m[1],
-                            body.joint_position_m[2]};
-  if (avatar.template_mode != TemplateMode::kShaped) return root;
+// Rest positions [J,3] of the joints of the person's own template.
+std::vector<float> rest_joints(const Avatar& avatar, const Body& body) {
+  std::vector<float> joints(body.joint_position_m.begin(), body.joint_position_m.end());
+  if (avatar.template_mode != TemplateMode::kShaped) return joints;
   for (size_t s = 0; s < avatar.shape.size(); ++s) {
-    for (size_t k = 0; k < 3; ++k)
-      root[k] += avatar.shape[s] * body.joint_shape_basis_m[s * body.joint_position_m.size() + k];
+    for (size_t k = 0; k < joints.size(); ++k)
+      joints[k] += avatar.shape[s] * body.joint_shape_basis_m[s * joints.size() + k];
   }
-  return root;
+  return joints;
 }
 
 // The motion of a figure, checked against its body; none where none is asked for.
@@ -72,7 +71,7 @@ Result<Scene::Figure> Scene::load_figure(const SceneOptions& options, size_t ind
   if (!place.ok()) return place.status();
   figure.place = *place;
   const Body& body = figure.body->package.body();
-  figure.rest_root_m = rest_root(figure.avatar->avatar, body);
+  figure.rest_joints_m = rest_joints(figure.avatar->avatar, body);
   figure.rotations.resize(size_t(body.joint_count()) * 4);
   if (figure.motion) {
     figure.source = std::make_unique<MotionPoses>(figure.motion->package.motion());
@@ -181,22 +180,32 @@ void Scene::place_figure(size_t index, const PoseView& pose) {
   if (heading != 0) {
     store_quaternion(rotation_about({0, 1, 0}, heading) * quaternion_at(figure.rotations.data()),
                      figure.rotations.data());
-    const double x = figure.rest_root_m[0] + pose.root_translation_m[0],
-                 z = figure.rest_root_m[2] + pose.root_translation_m[2];
+    const double x = figure.rest_joints_m[0] + pose.root_translation_m[0],
+                 z = figure.rest_joints_m[2] + pose.root_translation_m[2];
     figure.root_translation_m[0] =
-        static_cast<float>(std::cos(heading) * x + std::sin(heading) * z - figure.rest_root_m[0]);
-    figure.root_translation_m[2] =
-        static_cast<float>(-std::sin(heading) * x + std::cos(heading) * z - figure.rest_root_m[2]);
+        static_cast<float>(std::cos(heading) * x + std::sin(heading) * z - figure.rest_joints_m[0]);
+    figure.root_translation_m[2] = static_cast<float>(
+        -std::sin(heading) * x + std::cos(heading) * z - figure.rest_joints_m[2]);
   }
   figure.root_translation_m[0] += figure.place.x_m;
   figure.root_translation_m[2] += figure.place.z_m;
   posed_[index].pose = {figure.root_translation_m, figure.rotations};
 }
 
+std::array<float, 3> Scene::joint_m(size_t figure, uint32_t joint) const {
+  const Figure& f = figures_[figure];
+  const Body& body = f.body->package.body();
+  std::vector<Affine> world_from_rest(body.joint_count());
+  skinning_transforms({body.parents, f.rest_joints_m}, {f.root_translation_m, f.rotations},
+                      world_from_rest);
+  return transform_point(world_from_rest[joint], &f.rest_joints_m[size_t(joint) * 3]);
+}
+
 std::array<float, 3> Scene::root_m(size_t figure) const {
   const Figure& f = figures_[figure];
-  return {f.rest_root_m[0] + f.root_translation_m[0], f.rest_root_m[1] + f.root_translation_m[1],
-          f.rest_root_m[2] + f.root_translation_m[2]};
+  return {f.rest_joints_m[0] + f.root_translation_m[0],
+          f.rest_joints_m[1] + f.root_translation_m[1],
+          f.rest_joints_m[2] + f.root_translation_m[2]};
 }
 
 float Scene::heading_deg(size_t figure) const {

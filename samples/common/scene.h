@@ -56,7 +56,9 @@ class Scene {
   // A figure's source for pose_at(); at first its motion, or its golden pose.
   void set_source(size_t figure, std::unique_ptr<PoseSource> source);
 
-  // World position of a figure's root joint in the last pose.
+  // World position of a figure's joint in the last pose. Allocates.
+  std::array<float, 3> joint_m(size_t figure, uint32_t joint) const;
+  // The same of its root joint. Allocates nothing.
   std::array<float, 3> root_m(size_t figure) const;
   // Where a figure looks in the last pose, in degrees about the vertical: 0 is +z, positive towards
   // +x.
@@ -67,7 +69,7 @@ class Scene {
     std::shared_ptr<LoadedAvatar> avatar;
     std::shared_ptr<LoadedPackage> body, motion;
     Placement place;
-    std::array<float, 3> rest_root_m{0, 0, 0};  // of the template that the Gaussians sit on
+    std::vector<float> rest_joints_m;  // [J,3] of the template that the Gaussians sit on
     std::unique_ptr<PoseSource> source, swaying;
     std::vector<float> rotations;  // [J,4] of the last pose
     std::array<float, 3> root_translation_m{0, 0, 0};

@@ -32,6 +32,7 @@ constexpr uint32_t kWarmUpFrames = 3;
 struct BenchOptions {
   SceneOptions scene;
   DeviceOptions device;
+  Approximation approximation;
   std::string size, json;
   uint32_t frames = 60;
 };
@@ -44,6 +45,7 @@ struct Lane {
   std::unique_ptr<Scene> scene;
   std::vector<uint32_t> frames;
   std::vector<Camera> cameras;
+  Approximation approximation;
   FrameLog log;
   uint64_t allocations = 0;
 
@@ -54,8 +56,12 @@ struct Lane {
     const std::span<const FrameAvatar> posed = pose(i);
     if (measured) start_counting_allocations();
     const uint64_t start_ns = ports::now_ns();
-    const Status status =
-        renderer->render({.camera = cameras[i % cameras.size()], .avatars = posed}, frame.target());
+    // A pose that comes again has its run all the same.
+    const Status status = renderer->render({.camera = cameras[i % cameras.size()],
+                                            .avatars = posed,
+                                            .leave_out = {.unchanged_networks = false},
+                                            .approximation = approximation},
+                                           frame.target());
     const uint64_t total_ns = ports::now_ns() - start_ns;
     if (measured) {
       allocations += stop_counting_allocations();
@@ -194,6 +200,7 @@ Status run_bench(const BenchOptions& options) {
     Lane lane;
     lane.precision = precision;
     lane.threads = threads;
+    lane.approximation = options.approximation;
     FirstFrame again;
     FIG_RETURN_IF_ERROR(open_lane(options, *renderer_options, lane, lanes.empty() ? first : again));
     Result<std::vector<uint32_t>> frames = lane.scene->frames({});
@@ -233,6 +240,7 @@ Status run_bench(const BenchOptions& options) {
   json["motion"] = options.scene.motions.empty() ? nlohmann::ordered_json()
                                                  : nlohmann::ordered_json(options.scene.motions[0]);
   json["frames"] = options.frames;
+  json["network_below_px"] = options.approximation.network_below_px;
   json["size"] = {lanes[0].cameras[0].width_px, lanes[0].cameras[0].height_px};
   json["first_frame_ms"] = {{"total", first.open_ms + first.prepare_ms + first.render_ms},
                             {"open", first.open_ms},
@@ -278,6 +286,7 @@ Command add_bench_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the golden frame's");
   options->device.add_to(*command, false);
+  add_options(*command, options->approximation);
   command->add_option("--json", options->json,
                       "write the figures to this file; - prints them instead of the table");
   return {command, [options] { return run_bench(*options); }};

@@ -22,7 +22,8 @@ namespace {
 struct RenderOptions {
   SceneOptions scene;
   DeviceOptions device;
-  std::string frames, camera, size, background, follow = "smooth";
+  Approximation approximation;
+  std::string frames, camera, size, background, follow = "smooth", framing = "body";
   std::optional<float> near_m;
   std::optional<double> frames_per_second;
   std::string output, contact_sheet;
@@ -74,6 +75,9 @@ Result<Job> prepare(const RenderOptions& options) {
     if (!size.ok()) return size.status();
     camera_path.size = *size;
   }
+  const Result<Framing> framing = parse_framing(options.framing);
+  if (!framing.ok()) return framing.status();
+  camera_path.framing = *framing;
   if (!options.camera.empty()) {
     const Result<CameraSpec> camera = parse_camera_spec(options.camera);
     if (!camera.ok()) return camera.status();
@@ -134,7 +138,8 @@ Status run_render(const RenderOptions& options) {
     const uint64_t frame_start_ns = ports::now_ns();
     FIG_RETURN_IF_ERROR((*renderer)->render({.camera = (*cameras)[i],
                                              .avatars = job->scene.pose(job->frames[i]),
-                                             .background = job->background},
+                                             .background = job->background,
+                                             .approximation = options.approximation},
                                             frame.target()));
     log.add((*renderer)->statistics(), ports::now_ns() - frame_start_ns);
     if (sink) FIG_RETURN_IF_ERROR(sink->add(frame));
@@ -156,6 +161,7 @@ Status run_render(const RenderOptions& options) {
     json["frames_per_second"] =
         1000 / std::max(log.total_ms().median, 1e-6);  // of rendering, by the median frame
     json["frames_per_second_with_output"] = frame_count / std::max(wall_s, 1e-9);
+    json["network_below_px"] = options.approximation.network_below_px;
     json["stages_ms"] = log.stages_json();
     json["work"] = log.work_json();
     json["renderer_memory_bytes"] = (*renderer)->memory_bytes();
@@ -199,6 +205,13 @@ Command add_render_command(CLI::App& app) {
                       "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
   command
       ->add_option(
+          "--framing", options->framing,
+          "what of the figures the picture holds: body, bust (head and shoulders) or head; "
+          "an orbit is about its middle")
+      ->check(CLI::IsMember({"body", "bust", "head"}))
+      ->capture_default_str();
+  command
+      ->add_option(
           "--follow", options->follow,
           "what an orbit's target does: smooth (goes along with the figures) or off (stays)")
       ->check(CLI::IsMember({"smooth", "off"}))
@@ -228,6 +241,7 @@ Command add_render_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("-o,--output", options->output, "x.png, x_%04d.png, x.pfm, x.y4m or x.mp4");
   options->device.add_to(*command);
+  add_options(*command, options->approximation);
   return {command, [options] { return run_render(*options); }};
 }
 

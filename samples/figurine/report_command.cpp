@@ -161,9 +161,12 @@ class SettingRenderer {
     SceneRenderer& used = renderer_of(knobs);
     const std::span<const FrameAvatar> posed =
         used.scene->moves() ? used.scene->pose(frames_[i % frames_.size()]) : used.scene->sway(i);
-    return used.renderer->render(
-        {.camera = cameras_[i % cameras_.size()], .avatars = posed, .splat = knobs.splat},
-        picture.target());
+    // Every setting pays for its network, whichever drew the pose before it.
+    return used.renderer->render({.camera = cameras_[i % cameras_.size()],
+                                  .avatars = posed,
+                                  .splat = knobs.splat,
+                                  .leave_out = {.unchanged_networks = false}},
+                                 picture.target());
   }
   Status measure(uint32_t i, const Setting& setting, const RenderedFrame& truth, RenderedFrame& u8,
                  RenderedFrame& f32, Measurement& result) {

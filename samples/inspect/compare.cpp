@@ -14,6 +14,7 @@ Json flatten_fields(const Package& package, const std::string& path) {
   document.erase("file");
   document.erase("content_hash");
   document.erase("size_bytes");
+  document.erase("parts");
   return document.flatten();
 }
 

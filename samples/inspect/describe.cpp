@@ -87,13 +87,15 @@ Json describe_body(const Body& body) {
                       {"parent", body.parents[j]},
                       {"rest_position_m", numbers(body.joint_position_m.subspan(j * 3, 3))}});
   }
-  return {{"uv_size", body.uv_size},
-          {"covered_texels", body.texel_count()},
-          {"border_texels", body.border_texel.size()},
-          {"shape_coefficients", body.shape_count()},
-          {"rest_extent_m", {{"min", numbers(low)}, {"max", numbers(high)}}},
-          {"left_arm_below_horizontal_deg", left_arm_below_horizontal(body)},
-          {"joints", joints}};
+  Json out = {{"uv_size", body.uv_size},
+              {"covered_texels", body.texel_count()},
+              {"border_texels", body.border_texel.size()},
+              {"shape_coefficients", body.shape_count()},
+              {"rest_extent_m", {{"min", numbers(low)}, {"max", numbers(high)}}},
+              {"left_arm_below_horizontal_deg", left_arm_below_horizontal(body)},
+              {"joints", joints}};
+  if (!body.texel_triangle.empty()) out["mesh_places"] = true;
+  return out;
 }
 
 Json describe_motion(const Motion& motion) {
@@ -119,6 +121,7 @@ std::string layer_name(const Layer& layer) {
 }
 
 Json describe_network(const Network& network) {
+  if (network.layers.empty()) return nullptr;
   const std::vector<ValueShape> shapes = infer_shapes(network, false).value();
   Json layers = Json::array();
   for (size_t i = 0; i < network.layers.size(); ++i) {
@@ -186,6 +189,24 @@ Json describe_fixed_point(const Avatar& avatar) {
   return {{"bytes", bytes}, {"input_scale", number(fixed.values[0].scale)}, {"layers", layers}};
 }
 
+Json describe_static_part(const StaticPart& part) {
+  if (part.empty()) return nullptr;
+  uint64_t bytes = 0;
+  Json groups = Json::array();
+  for (const StaticGroup& group : part.groups) {
+    const uint64_t group_bytes = group.values.size_bytes() + group.scale.size_bytes();
+    const auto [low, high] = std::ranges::minmax(group.scale);
+    groups.push_back({{"first_channel", group.first_channel},
+                      {"channels", group.channels},
+                      {"grid_size", group.grid_size},
+                      {"cells", group.values.size() / group.channels},
+                      {"bytes", group_bytes},
+                      {"scale", {{"min", number(low)}, {"max", number(high)}}}});
+    bytes += group_bytes;
+  }
+  return {{"bytes", bytes}, {"groups", groups}};
+}
+
 const char* template_name(TemplateMode mode) {
   return mode == TemplateMode::kMean ? "mean" : "shaped";
 }
@@ -211,6 +232,7 @@ Json describe_kind(const AvatarKind& kind, const Json& rest) {
 
 Json describe_avatar(const Avatar& avatar) {
   return describe_kind(avatar, {{"shape", numbers(avatar.shape)},
+                                {"uv_size", avatar.texels_a_side()},
                                 {"fourier_octaves", avatar.fourier_octaves},
                                 {"map_mean", numbers(avatar.map_statistics.mean)},
                                 {"map_scale", numbers(avatar.map_statistics.scale)},
@@ -218,6 +240,7 @@ Json describe_avatar(const Avatar& avatar) {
                                 {"network", describe_network(avatar.network)},
                                 {"precisions", describe_precisions(avatar)},
                                 {"fixed_point", describe_fixed_point(avatar)},
+                                {"static_part", describe_static_part(avatar.static_part)},
                                 {"pose_statistics_joints", avatar.pose_statistics.joints},
                                 {"golden", describe_golden(avatar.golden)}});
 }
@@ -350,6 +373,20 @@ Json describe_sampler(const Sampler& sampler) {
                         {"report", describe_report(sampler.report)}});
 }
 
+// Bytes of the file by what they are: header, index, blobs by the first word of their names in the
+// order of the file, and the zeros between.
+Json describe_parts(const Package& package) {
+  Json parts{{"header", kPackageHeaderBytes}, {"index", package.index_bytes()}};
+  uint64_t sum = kPackageHeaderBytes + package.index_bytes();
+  for (const TensorInfo& tensor : package.tensors()) {
+    const std::string name = tensor.name.substr(0, tensor.name.find('.'));
+    parts[name] = parts.value(name, uint64_t{0}) + tensor.size_bytes;
+    sum += tensor.size_bytes;
+  }
+  parts["padding"] = package.size_bytes() - sum;
+  return parts;
+}
+
 }  // namespace
 
 Json describe(const Package& package, const std::string& path) {
@@ -361,6 +398,7 @@ Json describe(const Package& package, const std::string& path) {
                    {"name", ""},
                    {"content_hash", format_hash(package.content_hash())},
                    {"size_bytes", package.size_bytes()},
+                   {"parts", describe_parts(package)},
                    {"required_features", package.required_features()},
                    {"optional_features", package.optional_features()},
                    {"budget",

@@ -76,6 +76,8 @@ void print_body(Page& page, const Json& body) {
   page.heading("body");
   page.line("map", std::format("{0}x{0} texels, {1} covered, {2} border", text_of(body["uv_size"]),
                                text_of(body["covered_texels"]), text_of(body["border_texels"])));
+  if (body.contains("mesh_places"))
+    page.line("layout", "not the mesh's own: every texel states its place on the mesh");
   page.line("shape", text_of(body["shape_coefficients"]) + " coefficients");
   const Json &low = body["rest_extent_m"]["min"], &high = body["rest_extent_m"]["max"];
   std::string rest =
@@ -103,6 +105,7 @@ void print_motion(Page& page, const Json& motion) {
 }
 
 void print_network(Page& page, const Json& network) {
+  if (network.is_null()) return page.line("network", "none");
   page.line("network", std::format("input {0}x{0}x{1}, {2} layers, {3} parameters, {4} MACs",
                                    text_of(network["input"]["size"]),
                                    text_of(network["input"]["channels"]), network["layers"].size(),
@@ -122,6 +125,36 @@ void print_pose_statistics(Page& page, const Json& joints) {
   page.line("pose statistics", joints.empty() ? "none" : std::to_string(joints.size()) + " joints");
 }
 
+void print_static_part(Page& page, const Json& part) {
+  if (part.is_null()) return page.line("static part", "none");
+  std::string text = in_bytes(part["bytes"]);
+  for (const Json& group : part["groups"]) {
+    const auto first = group["first_channel"].get<uint32_t>();
+    text += std::format("\nchannels {} to {}: {} cells of {}x{}, {}", first,
+                        first + group["channels"].get<uint32_t>() - 1, text_of(group["cells"]),
+                        text_of(group["grid_size"]), text_of(group["grid_size"]),
+                        in_bytes(group["bytes"]));
+  }
+  page.line("static part", text);
+}
+
+// What takes how much of the file.
+std::string by_part(const Json& document) {
+  const std::pair<const char*, const char*> words[] = {
+      {"network", "network in float"}, {"fixed", "network in fixed point"},
+      {"static", "static part"},       {"pose", "pose statistics"},
+      {"golden", "golden frame"},      {"avatar", "shape coefficients"}};
+  std::string text = in_bytes(document["size_bytes"]);
+  for (const auto& [name, bytes] : document["parts"].items()) {
+    std::string label = name;
+    for (const auto& [part, meaning] : words) {
+      if (name == part) label = meaning;
+    }
+    text += std::format("\n{:<24}{:>9}", label, text_of(bytes));
+  }
+  return text;
+}
+
 void print_avatar(Page& page, const Json& avatar) {
   page.heading("avatar");
   page.line("body", text_of(avatar["body"]["name"]) + "  " + text_of(avatar["body"]["hash"]));
@@ -129,7 +162,9 @@ void print_avatar(Page& page, const Json& avatar) {
   page.line("preset", text_of(avatar["preset"]));
   page.line("template", text_of(avatar["template"]) + ", " +
                             std::to_string(avatar["shape"].size()) + " shape coefficients");
+  page.line("map", std::format("{0}x{0} texels", text_of(avatar["uv_size"])));
   print_network(page, avatar["network"]);
+  print_static_part(page, avatar["static_part"]);
   page.line("precision", joined(avatar["precisions"], ", "));
   if (const Json& fixed = avatar["fixed_point"]; !fixed.is_null()) {
     page.line("fixed point",
@@ -322,7 +357,7 @@ std::string print_package(const Json& document) {
                                 text_of(document["version"])));
   page.line("name", text_of(document["name"]));
   page.line("content hash", text_of(document["content_hash"]));
-  page.line("size", in_bytes(document["size_bytes"]));
+  page.line("size", by_part(document));
   page.line("features", std::format("required {:#x}, optional {:#x}",
                                     document["required_features"].get<uint64_t>(),
                                     document["optional_features"].get<uint64_t>()));

@@ -43,7 +43,8 @@ def capture(body, folder, *options):
     if about and about["complete"]:
         return 0.0
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    run_tool("capture", "--body", body, "--threads", "1", "--resume", "-o", folder, *options)
+    run_tool("capture", "--body", body, "--threads", "1", "--resume", "-o", folder, "--bust-views",
+             "0", *options)  # whole people, whose pictures all have one size
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 

@@ -82,7 +82,8 @@ def write_capture(program, folder):
     """The mannequin, walking, from eight cameras."""
     timed([program, "body", "--mannequin", "--uv", 128, "-o", folder / "body.fgn"])
     command = [program, "capture", "--body", folder / "body.fgn", "--identities", 1, "--seed", 1]
-    timed([*command, "--views", 8, "--frames", 8, "--size", "256x256", "-o", folder / "capture"])
+    command += ["--views", 8, "--bust-views", 0, "--frames", 8, "--size", "256x256"]
+    timed([*command, "-o", folder / "capture"])
 
 
 class Neighbours:

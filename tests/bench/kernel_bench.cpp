@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "runtime/kernels/random_jobs.h"
@@ -71,19 +72,24 @@ void time_kernel(benchmark::State& state, kernels::PoseMaps* kernel) {
   count_items(state, kBlocks * kLanes);
 }
 
-void time_kernel(benchmark::State& state, kernels::DecodeSkin* kernel) {
+// Of an avatar as the shipped ones are, or of one with a coarser network and a static part.
+void time_decode(benchmark::State& state, kernels::DecodeSkin* kernel, bool composed) {
   Random random(3);
   std::vector<kernels::TransformBlock> transforms(kBlocks);
   for (auto& block : transforms) block = kernels::tests::make_transforms(random);
   kernels::CanonicalBlock texels;
   kernels::tests::fill(texels.position_m, random, -1, 1);
   std::fill_n(texels.extent_m, kLanes, 0.005f);
+  const kernels::TapBlock taps = kernels::tests::make_taps(random, false);
+  const kernels::StaticBlock static_part = kernels::tests::make_static(random, false);
   float heads[kLanes][14];
   for (auto& head : heads) {
     for (float& value : head) value = random.normal();
   }
   kernels::GaussianBlock gaussians;
   kernels::DecodeSkinJob job{.head = {},
+                             .taps = composed ? &taps : nullptr,
+                             .static_part = composed ? &static_part : nullptr,
                              .texels = &texels,
                              .transforms = nullptr,
                              .offset_scale_m = 0.05f,
@@ -92,7 +98,9 @@ void time_kernel(benchmark::State& state, kernels::DecodeSkin* kernel) {
                              .opacity_bias = 2,
                              .sh_values = 3,
                              .gaussians = &gaussians};
-  for (uint32_t lane = 0; lane < kLanes; ++lane) job.head[lane] = heads[lane];
+  for (uint32_t lane = 0; lane < kLanes; ++lane) {
+    for (uint32_t k = 0; k < kernels::kTaps; ++k) job.head[k][lane] = heads[(lane + k) % kLanes];
+  }
   for (auto _ : state) {
     for (size_t i = 0; i < kBlocks; ++i) {
       job.transforms = &transforms[i];
@@ -101,6 +109,10 @@ void time_kernel(benchmark::State& state, kernels::DecodeSkin* kernel) {
     }
   }
   count_items(state, kBlocks * kLanes);
+}
+
+void time_kernel(benchmark::State& state, kernels::DecodeSkin* kernel) {
+  time_decode(state, kernel, false);
 }
 
 void time_kernel(benchmark::State& state, kernels::ProjectBlock* kernel) {
@@ -197,6 +209,11 @@ void add_row(const char* operation, const char* isa_name, Type* kernel) {
   if (!isa || std::find(supported.begin(), supported.end(), *isa) == supported.end()) return;
   benchmark::RegisterBenchmark((std::string(operation) + "/" + isa_name).c_str(),
                                [=](benchmark::State& state) { time_kernel(state, kernel); });
+  if constexpr (std::is_same_v<Type, kernels::DecodeSkin>) {
+    benchmark::RegisterBenchmark(
+        (std::string(operation) + "_composed/" + isa_name).c_str(),
+        [=](benchmark::State& state) { time_decode(state, kernel, true); });
+  }
 }
 
 }  // namespace

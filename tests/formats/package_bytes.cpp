@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "figurine/texel_grid.h"
 #include "formats/src/package/checksum.h"
 #include "formats/src/package/text.h"
 #include "formats/writer/package_writer.h"
@@ -143,6 +144,37 @@ bool exercise_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& s
   return all_finite(evaluate_fixed_point(avatar.network, avatar.fixed_point, input).result);
 }
 
+// Its network's shapes, weights and arithmetic; the avatar has one.
+bool exercise_network(const Avatar& avatar, std::string& reason) {
+  reason = "shapes or weights of the network";
+  const Result<std::vector<ValueShape>> shapes =
+      infer_shapes(avatar.network, avatar.holds(Precision::kFloat32));
+  if (!shapes.ok() || shapes->back().channels != head_channels(avatar.decoding.sh_degree))
+    return false;
+  if (!grid_fits(avatar.texels_a_side(), avatar.network.input_size)) return false;
+  for (const Layer& layer : avatar.network.layers) {
+    if (!all_finite(layer.weights) || !all_finite(layer.bias)) return false;
+  }
+  reason = "a network in fixed point";
+  return exercise_fixed_point(avatar, *shapes);
+}
+
+// Every value as the device computes it, and e^s of the colours.
+bool exercise_static_part(const Avatar& avatar) {
+  if (avatar.static_part.empty()) return avatar.has_network();
+  if (!validate_static_part(avatar.static_part, avatar.texels_a_side()).ok()) return false;
+  for (const StaticGroup& group : avatar.static_part.groups) {
+    for (size_t i = 0; i < group.values.size(); ++i) {
+      const auto c = static_cast<uint32_t>(i % group.channels);
+      const float value = group.scale[c] * static_cast<float>(group.values[i]);
+      if (!std::isfinite(std::exp(group.first_channel + c < kStaticColour ? 0 : value)))
+        return false;
+      if (!(std::fabs(value) <= kMaxStaticValue)) return false;
+    }
+  }
+  return true;
+}
+
 bool exercise_golden(const GoldenFrame& golden) {
   if (golden.rotations.empty()) return golden.png.empty();
   const uint32_t joints = static_cast<uint32_t>(golden.rotations.size() / 4);
@@ -151,16 +183,9 @@ bool exercise_golden(const GoldenFrame& golden) {
 }
 
 bool exercise_avatar(const Avatar& avatar, std::string& reason) {
-  reason = "shapes or weights of the network";
-  const Result<std::vector<ValueShape>> shapes =
-      infer_shapes(avatar.network, avatar.holds(Precision::kFloat32));
-  if (!shapes.ok() || shapes->back().channels != head_channels(avatar.decoding.sh_degree))
-    return false;
-  for (const Layer& layer : avatar.network.layers) {
-    if (!all_finite(layer.weights) || !all_finite(layer.bias)) return false;
-  }
-  reason = "a network in fixed point";
-  if (!exercise_fixed_point(avatar, *shapes)) return false;
+  if (avatar.has_network() && !exercise_network(avatar, reason)) return false;
+  reason = "a static part";
+  if (!exercise_static_part(avatar)) return false;
   reason = "shape or pose statistics";
   const size_t features = avatar.pose_statistics.joints.size() * 3;
   if (avatar.pose_statistics.mean.size() != features ||

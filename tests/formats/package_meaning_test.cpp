@@ -105,6 +105,35 @@ TEST(PackageBody, RejectsIndicesOutOfRange) {
                  "body.border_source: entry 2");
 }
 
+TEST(PackageBody, RejectsPlacesOnTheMeshThatAreNone) {
+  const auto placed = [](const std::function<void(std::vector<float>&, Body&)>& bend) {
+    const std::vector<uint32_t> triangle = {0, 4, 4, 7,
+                                            UINT32_MAX};  // the mesh's size is not known
+    std::vector<float> weights;
+    for (size_t i = 0; i < triangle.size(); ++i)
+      weights.insert(weights.end(), {0.5f, 0.375f, 0.125f});
+    return bent_body([&](BodySample& s) {
+      s.body.texel_triangle = triangle;
+      s.body.texel_barycentric = weights;
+      bend(weights, s.body);
+    });
+  };
+  EXPECT_TRUE(placed([](auto&, Body&) {}).ok());
+  for (float value : {kNan, kInfinity, -0.25f, 1.25f}) {
+    expect_refused(placed([&](auto& weights, Body&) { weights[7] = value; }),
+                   "body.texel_barycentric: texel 2: is not inside its triangle");
+  }
+  expect_refused(placed([](auto& weights, Body&) { weights[7] += 2e-4f; }),
+                 "body.texel_barycentric: texel 2: sums to 1.0002");
+  expect_refused(placed([](auto&, Body& body) { body.texel_triangle = {}; }),
+                 "body.texel_triangle: and body.texel_barycentric: one is there without the other");
+  expect_refused(placed([](auto&, Body& body) { body.texel_barycentric = {}; }),
+                 "body.texel_triangle: and body.texel_barycentric: one is there without the other");
+  expect_refused(
+      placed([](auto&, Body& body) { body.texel_triangle = body.texel_triangle.first(4); }),
+      "body.texel_triangle", StatusCode::kInvalidArgument);
+}
+
 TEST(PackageBody, RejectsLengthsThatAreNotPositiveAndFinite) {
   for (float value : {0.0f, -1.0f, kNan, kInfinity}) {
     expect_refused(bent_body([&](BodySample& s) { s.texel_spacing[2] = value; }),

@@ -69,6 +69,20 @@ TEST(PackageRoundTrip, BodyKeepsEveryField) {
   expect_same(samples::make_provenance(), opened.package.provenance());
 }
 
+TEST(PackageRoundTrip, BodyKeepsPlacesOnTheMeshWhereItStatesThem) {
+  BodySample sample;
+  EXPECT_TRUE(open_or_die(sample.write()).package.body().texel_triangle.empty());
+  const std::vector<uint32_t> triangle = {3, 0, 2, 2, 9};
+  const std::vector<float> weights = {1, 0, 0, 0.5f, 0.5f, 0, 0.25f, 0.25f, 0.5f, 0, 1, 0, 0, 0, 1};
+  sample.body.texel_triangle = triangle;
+  sample.body.texel_barycentric = weights;
+  const Opened opened = open_or_die(sample.write());
+  EXPECT_TRUE(same(opened.package.body().texel_triangle, sample.body.texel_triangle));
+  EXPECT_TRUE(same(opened.package.body().texel_barycentric, sample.body.texel_barycentric));
+  EXPECT_EQ(opened.package.required_features(), 0u);  // a reader of before skips them
+  EXPECT_EQ(format_hash(opened.package.content_hash()), "a82e0edf03015c1198e15b6bb99488a2");
+}
+
 TEST(PackageRoundTrip, AvatarKeepsEveryField) {
   const AvatarSample sample;
   const Opened opened = open_or_die(sample.write());

@@ -74,6 +74,28 @@ BodySample::BodySample() {
           .border_source = border_source};
 }
 
+namespace {
+
+// Points an avatar's layers at patterned weights of the network's shapes.
+void fill_network(AvatarSample& sample) {
+  Network& network = sample.avatar.network;
+  const std::vector<ValueShape> shapes = *infer_shapes(network, false);
+  sample.weights.assign(network.layers.size(), {});
+  sample.biases.assign(network.layers.size(), {});
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    Layer& layer = network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    sample.weights[i] = patterned(size_t{layer.out_channels} * layer.kernel * layer.kernel *
+                                  shapes[layer.inputs[0]].channels);
+    sample.biases[i] = patterned(layer.out_channels);
+    layer.weights = sample.weights[i];
+    layer.bias = sample.biases[i];
+  }
+  sample.budget.macs_per_frame = count_macs(network, shapes);
+}
+
+}  // namespace
+
 AvatarSample::AvatarSample() {
   avatar.name = "sample avatar";
   avatar.body_name = "sample body";
@@ -90,18 +112,8 @@ AvatarSample::AvatarSample() {
                      .opacity_bias = 2,
                      .sh_degree = 1};
   avatar.network = make_pose_unet(8, kMapChannels + 4, 2, head_channels(1));
-  const std::vector<ValueShape> shapes = *infer_shapes(avatar.network, false);
-  weights.resize(avatar.network.layers.size());
-  biases.resize(avatar.network.layers.size());
-  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
-    Layer& layer = avatar.network.layers[i];
-    if (layer.op != LayerOp::kConv2d) continue;
-    weights[i] = patterned(size_t{layer.out_channels} * layer.kernel * layer.kernel *
-                           shapes[layer.inputs[0]].channels);
-    biases[i] = patterned(layer.out_channels);
-    layer.weights = weights[i];
-    layer.bias = biases[i];
-  }
+  budget = {.peak_memory_bytes = 1 << 20, .macs_per_frame = 0, .gaussians = 5};
+  fill_network(*this);
   pose_mean = {0.25f, 0, -0.5f};
   pose_covariance = {0.5f, 0.125f, 0, 0.125f, 0.25f, 0.0625f, 0, 0.0625f, 1};
   avatar.pose_statistics = {.joints = {2}, .mean = pose_mean, .covariance = pose_covariance};
@@ -119,9 +131,6 @@ AvatarSample::AvatarSample() {
   avatar.golden.camera.view_from_world = {0, 0, 1, 0.5f, 1, 0, 0, 0.25f, 0, 1, 0, 3};
   avatar.golden.background = {0.5f, 0.25f, 1};
   avatar.golden.png = golden_png;
-  budget = {.peak_memory_bytes = 1 << 20,
-            .macs_per_frame = count_macs(avatar.network, shapes),
-            .gaussians = 5};
 }
 
 FixedPointAvatarSample::FixedPointAvatarSample() {
@@ -160,6 +169,49 @@ FixedPointAvatarSample& FixedPointAvatarSample::with_floats() {
   return *this;
 }
 
+StaticAvatarSample::StaticAvatarSample() {
+  avatar.name = "sample avatar with a static part";
+  avatar.uv_size = 8;
+  avatar.network = {
+      .input_size = 4,
+      .input_channels = kMapChannels + 4,
+      .layers = {
+          {.op = LayerOp::kConv2d, .inputs = {0, 0}, .out_channels = 2, .kernel = 3, .relu = true},
+          {.op = LayerOp::kMaxPool2, .inputs = {1, 0}},
+          {.op = LayerOp::kUpsample2, .inputs = {2, 0}},
+          {.op = LayerOp::kConcat, .inputs = {1, 3}},
+          {.op = LayerOp::kConv2d,
+           .inputs = {4, 0},
+           .out_channels = head_channels(1),
+           .kernel = 1}}};
+  fill_network(*this);
+  for (uint32_t k = 0; k < 2 * kStaticColour; ++k)
+    geometry.push_back(static_cast<int8_t>(int(k * 37) % 255 - 127));
+  for (uint32_t k = 0; k < 5 * 3; ++k)
+    colour.push_back(static_cast<int8_t>(int(k * 53) % 255 - 127));
+  for (uint32_t c = 0; c < kStaticColour; ++c)
+    geometry_scale.push_back(0.00390625f * static_cast<float>(c + 1));
+  colour_scale = {0.0078125f, 0.015625f, 0.00390625f};
+  avatar.static_part.groups = {{.first_channel = 0,
+                                .channels = kStaticColour,
+                                .grid_size = 2,
+                                .values = geometry,
+                                .scale = geometry_scale},
+                               {.first_channel = kStaticColour,
+                                .channels = 3,
+                                .grid_size = 8,
+                                .values = colour,
+                                .scale = colour_scale}};
+}
+
+StaticOnlyAvatarSample::StaticOnlyAvatarSample() {
+  avatar.name = "sample avatar without a network";
+  avatar.network = {};
+  avatar.fourier_octaves = 0;
+  budget.macs_per_frame = 0;
+  avatar.golden.fixed_point_hash = {0x1111222233334444u, 0x5555666677778888u};
+}
+
 PopulationSample::PopulationSample(DifferenceCoding coding)
     : initial(std::make_unique<AvatarSample>()) {
   for (size_t m = 0; m < 3; ++m) {
@@ -196,6 +248,8 @@ PopulationSample::PopulationSample(DifferenceCoding coding)
 std::string to_string(SampleKind kind) {
   if (kind == SampleKind::kFixedPointAvatar) return "fixed_point_avatar";
   if (kind == SampleKind::kHalfPopulation) return "half_population";
+  if (kind == SampleKind::kStaticAvatar) return "static_avatar";
+  if (kind == SampleKind::kStaticOnlyAvatar) return "static_only_avatar";
   return figurine::to_string(package_kind(kind));
 }
 
@@ -205,6 +259,8 @@ PackageKind package_kind(SampleKind kind) {
       return PackageKind::kBody;
     case SampleKind::kAvatar:
     case SampleKind::kFixedPointAvatar:
+    case SampleKind::kStaticAvatar:
+    case SampleKind::kStaticOnlyAvatar:
       return PackageKind::kAvatar;
     case SampleKind::kMotion:
       return PackageKind::kMotion;
@@ -233,6 +289,10 @@ Result<std::vector<std::byte>> write_sample(SampleKind kind) {
       return PopulationSample(DifferenceCoding::kHalf).write();
     case SampleKind::kSampler:
       return SamplerSample().write();
+    case SampleKind::kStaticAvatar:
+      return StaticAvatarSample().write();
+    case SampleKind::kStaticOnlyAvatar:
+      return StaticOnlyAvatarSample().write();
   }
   return Status(StatusCode::kInvalidArgument, "no such sample");
 }

@@ -61,6 +61,21 @@ struct FixedPointAvatarSample : AvatarSample {
   FixedPointAvatarSample& with_floats();
 };
 
+// The same avatar on the sample body with a static part at two grids and a network at half the
+// side: geometry at 2 x 2 cells, colour at every texel.
+struct StaticAvatarSample : AvatarSample {
+  StaticAvatarSample();
+  std::vector<int8_t> geometry, colour;             // [2,11], [5,3]
+  std::vector<float> geometry_scale, colour_scale;  // [11], [3]
+
+  StaticGroup& group(size_t g) { return avatar.static_part.groups[g]; }
+};
+
+// Its static part alone: no network.
+struct StaticOnlyAvatarSample : StaticAvatarSample {
+  StaticOnlyAvatarSample();
+};
+
 // Three avatars of one network, each a little different from common initial weights: one
 // population, in integers or in halves.
 struct PopulationSample {
@@ -107,12 +122,14 @@ enum class SampleKind {
   kMotion,
   kPopulation,
   kHalfPopulation,
-  kSampler
+  kSampler,
+  kStaticAvatar,
+  kStaticOnlyAvatar
 };
 inline constexpr SampleKind kSampleKinds[] = {
-    SampleKind::kBody,   SampleKind::kAvatar,     SampleKind::kFixedPointAvatar,
-    SampleKind::kMotion, SampleKind::kPopulation, SampleKind::kHalfPopulation,
-    SampleKind::kSampler};
+    SampleKind::kBody,    SampleKind::kAvatar,       SampleKind::kFixedPointAvatar,
+    SampleKind::kMotion,  SampleKind::kPopulation,   SampleKind::kHalfPopulation,
+    SampleKind::kSampler, SampleKind::kStaticAvatar, SampleKind::kStaticOnlyAvatar};
 std::string to_string(SampleKind kind);  // also the name of its golden file: "fixed_point_avatar"
 PackageKind package_kind(SampleKind kind);
 Result<std::vector<std::byte>> write_sample(SampleKind kind);

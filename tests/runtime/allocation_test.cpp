@@ -88,11 +88,14 @@ void expect_no_allocations(uint32_t threads, Held held) {
   const SyntheticBody body = make_test_body({.uv_size = 32});
   const SyntheticAvatar avatar = make_test_avatar(body, {.held = held}),
                         other = make_test_avatar(
-                            body, {.sh_degree = 2, .seed = 3, .held = Held::kFixedPoint});
+                            body, {.sh_degree = 2, .seed = 3, .held = Held::kFixedPoint}),
+                        composed = make_test_avatar(
+                            body, {.held = held, .network_step = 2, .static_part = true});
   const std::unique_ptr<Renderer> renderer = make_renderer(threads);
   const Result<AvatarId> a = renderer->add_avatar(*avatar.package, *body.package),
-                         b = renderer->add_avatar(*other.package, *body.package);
-  ASSERT_TRUE(a.ok() && b.ok());
+                         b = renderer->add_avatar(*other.package, *body.package),
+                         c = renderer->add_avatar(*composed.package, *body.package);
+  ASSERT_TRUE(a.ok() && b.ok() && c.ok());
   const Scene scene = make_random_scene(5000, 1, 4);
   const GaussianView view = scene.view();
   std::vector<SyntheticPose> poses;
@@ -108,7 +111,8 @@ void expect_no_allocations(uint32_t threads, Held held) {
   uint64_t after_first = 0, first_pairs = 0, largest_pairs = 0;
   for (uint32_t frame = 0; frame < 12; ++frame) {
     const FrameAvatar seen[] = {{.avatar = *a, .pose = poses[frame].view()},
-                                {.avatar = *b, .pose = poses[11 - frame].view()}};
+                                {.avatar = *b, .pose = poses[11 - frame].view()},
+                                {.avatar = *c, .pose = poses[frame].view()}};
     ASSERT_TRUE(renderer
                     ->render({.camera = cameras[frame], .avatars = seen, .gaussians = {&view, 1}},
                              {.pixels = rgba.data(), .stride_bytes = 800})
@@ -150,10 +154,11 @@ TEST(Allocation, ManySetsAndAvatarsAllocateNothingEither) {
   EXPECT_EQ(g_allocations - after_first, 0u);
 }
 
-void expect_memory_is_what_was_taken(Held held) {
+void expect_memory_is_what_was_taken(const SyntheticAvatarOptions& form) {
   const SyntheticBody body = make_test_body({.uv_size = 128});
-  const SyntheticAvatar avatar =
-      make_test_avatar(body, {.channels = 32, .fourier_octaves = 5, .held = held});
+  SyntheticAvatarOptions edge = form;
+  edge.channels = 32, edge.fourier_octaves = 5;
+  const SyntheticAvatar avatar = make_test_avatar(body, edge);
   const SyntheticPose pose = make_test_pose(body.body(), 1);
   std::vector<uint8_t> rgba(512 * 512 * 4);
   {
@@ -212,7 +217,8 @@ TEST(Allocation, WhatIsAddedAgainIsHeldOnce) {
   for (const Held held : {Held::kFloat32, Held::kFixedPoint}) {
     const SyntheticAvatar avatar = make_test_avatar(body, {.held = held}),
                           copy = make_test_avatar(body, {.held = held}),
-                          other = make_test_avatar(body, {.seed = 5, .held = held});
+                          other = make_test_avatar(body, {.seed = 5, .held = held}),
+                          composed = make_test_avatar(body, {.held = held, .static_part = true});
     const std::unique_ptr<Renderer> renderer = make_renderer();
     const auto add = [&](const SyntheticAvatar& added) {
       const Result<AvatarId> id = renderer->add_avatar(*added.package, *body.package);
@@ -238,13 +244,23 @@ TEST(Allocation, WhatIsAddedAgainIsHeldOnce) {
     };
     EXPECT_EQ(opacities(crowd.back()), opacities(first));
     EXPECT_NE(opacities(different), opacities(first));
+    // The same weights and a static part, which says nothing of opacities.
+    const auto first_place = [&](AvatarId id) {
+      const Result<GaussianView> posed = renderer->pose_avatar(id, pose.view());
+      EXPECT_TRUE(posed.ok());
+      return posed->position_m[0];
+    };
+    EXPECT_NE(first_place(add(composed)), first_place(first));
   }
 }
 
 TEST(Allocation, MemoryBytesIsWhatWasTaken) {
   if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
-  expect_memory_is_what_was_taken(Held::kFloat32);
-  expect_memory_is_what_was_taken(Held::kFixedPoint);
+  expect_memory_is_what_was_taken({.held = Held::kFloat32});
+  expect_memory_is_what_was_taken({.held = Held::kFixedPoint});
+  expect_memory_is_what_was_taken(
+      {.held = Held::kFixedPoint, .network_step = 2, .static_part = true});
+  expect_memory_is_what_was_taken({.network_step = 0, .static_part = true});
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // instruction sets and threads do not either.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
 #include "formats/writer/package_writer.h"
@@ -76,7 +77,8 @@ constexpr LeaveOut kNothing{.hidden_texels = false,
                             .transparent = false,
                             .outside = false,
                             .missed_tiles = false,
-                            .stopped = false};
+                            .stopped = false,
+                            .unchanged_networks = false};
 
 TEST_P(LeaveOutScene, EverySwitchIsExactAndCounted) {
   const Drawn all = draw({}), none = draw(kNothing);
@@ -106,6 +108,63 @@ TEST_P(LeaveOutScene, EachSwitchAloneIsExact) {
     LeaveOut one = kNothing;
     one.*member = true;
     ASSERT_EQ(draw(one).rgba, truth);
+  }
+}
+
+TEST_P(LeaveOutScene, ANetworkDoesNotRunForThePoseOfItsLastRun) {
+  const std::unique_ptr<Renderer> renderer = tests::make_renderer();
+  const Result<AvatarId> id = renderer->add_avatar(avatar_.avatar, *body_.package);
+  ASSERT_TRUE(id.ok());
+  const FrameAvatar twice[] = {{.avatar = *id, .pose = pose_.view()},
+                               {.avatar = *id, .pose = pose_.view()}};
+  const auto draw_twice = [&](const LeaveOut& leave_out) {
+    Frame frame{.camera = camera_, .avatars = twice};
+    frame.leave_out = leave_out;
+    return tests::render(*renderer, frame).rgba;
+  };
+  const std::vector<float> first = draw_twice({});
+  const FrameStatistics of_first = renderer->statistics();
+  EXPECT_EQ(of_first.networks, 1u);
+  EXPECT_EQ(of_first.left_out.unchanged_networks, 1u);
+  EXPECT_GT(of_first.macs, 0u);
+  EXPECT_EQ(draw_twice({}), first);
+  EXPECT_EQ(renderer->statistics().networks, 0u);
+  EXPECT_EQ(renderer->statistics().left_out.unchanged_networks, 2u);
+  EXPECT_EQ(renderer->statistics().macs, 0u);
+  EXPECT_EQ(draw_twice({.unchanged_networks = false}), first);
+  EXPECT_EQ(renderer->statistics().networks, 2u);
+  EXPECT_EQ(renderer->statistics().macs, 2 * of_first.macs);
+}
+
+TEST_P(LeaveOutScene, SmallFiguresMayKeepWhatTheirNetworkSaid) {
+  const std::unique_ptr<Renderer> renderer = tests::make_renderer();
+  const Result<AvatarId> id = renderer->add_avatar(avatar_.avatar, *body_.package);
+  ASSERT_TRUE(id.ok());
+  const SyntheticPose other = tests::make_test_pose(body_.body(), 4);
+  const auto draw_pose = [&](const SyntheticPose& pose, float below_px) {
+    const FrameAvatar seen[] = {{.avatar = *id, .pose = pose.view()}};
+    Frame frame{.camera = tests::make_test_camera(64, 64), .avatars = seen};
+    frame.approximation.network_below_px = below_px;
+    return tests::render(*renderer, frame).rgba;
+  };
+  const std::vector<float> truth = draw_pose(other, 0);
+  draw_pose(pose_, 0);
+  EXPECT_EQ(draw_pose(other, 10), truth) << "the figure is larger";
+  EXPECT_EQ(renderer->statistics().stale_networks, 0u);
+  draw_pose(pose_, 0);
+  EXPECT_NE(draw_pose(other, 200), truth);
+  EXPECT_EQ(renderer->statistics().stale_networks, 1u);
+  EXPECT_EQ(renderer->statistics().networks, 0u);
+  EXPECT_EQ(draw_pose(other, 0), truth);
+
+  Frame frame{.camera = camera_};
+  std::vector<uint8_t> pixels(size_t{4} * camera_.width_px * camera_.height_px);
+  for (const float below_px : {-1.0f, NAN, INFINITY}) {
+    frame.approximation.network_below_px = below_px;
+    const Status refused = renderer->render(
+        frame, {.pixels = pixels.data(), .stride_bytes = size_t{4} * camera_.width_px});
+    EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument);
+    EXPECT_NE(refused.message().find("network_below_px"), std::string::npos);
   }
 }
 

@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
 #include "formats/writer/package_writer.h"
 #include "runtime/nn/quantise_network.h"
+#include "runtime/pose/random_static_part.h"
 
 namespace figurine::tests {
 namespace {
@@ -21,15 +23,31 @@ std::unique_ptr<Package> open(const AlignedBytes& bytes, const char* name) {
   return std::make_unique<Package>(std::move(package).value());
 }
 
-// What the network reads in a bent pose: the calibration of networks in fixed point.
-std::vector<float> network_input(const Avatar& avatar, const Body& body) {
-  const uint32_t stride = kMapChannels + 4 * avatar.fourier_octaves;
-  const SyntheticPose pose = make_test_pose(body, 1);
-  std::vector<float> maps(size_t(body.uv_size) * body.uv_size * stride);
-  std::vector<Affine> transforms(body.joint_count());
-  draw_pose_maps(body, pose.view(), avatar.map_statistics, transforms, stride, maps);
-  draw_fourier_channels(body.uv_size, avatar.fourier_octaves, kMapChannels, stride, maps);
-  return maps;
+// Random ones, kept in storage. Returns the shapes of the network's values.
+std::vector<ValueShape> choose_weights(Network& network, const SyntheticAvatarOptions& options,
+                                       Random& random, std::vector<std::vector<float>>& storage) {
+  const Result<std::vector<ValueShape>> inferred = infer_shapes(network, false);
+  FIG_CHECK(inferred.ok(), inferred.status().message().c_str());
+  const std::vector<ValueShape>& shapes = *inferred;
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    Layer& layer = network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    const bool is_head = i + 1 == network.layers.size();
+    const uint32_t fan_in = layer.kernel * layer.kernel * shapes[layer.inputs[0]].channels;
+    std::vector<float> weights(size_t(layer.out_channels) * fan_in), bias(layer.out_channels);
+    const float deviation = std::sqrt(2.0f / static_cast<float>(fan_in)) * (is_head ? 0.3f : 1.0f);
+    for (float& weight : weights) weight = deviation * random.normal();
+    for (float& value : bias) value = 0.05f * random.normal();
+    if (is_head) {
+      for (int c = 0; c < 3; ++c)
+        bias[11 + c] = options.colour.empty() ? random.uniform(-1, 1) : options.colour[c];
+    }
+    storage.push_back(std::move(weights));
+    layer.weights = storage.back();
+    storage.push_back(std::move(bias));
+    layer.bias = storage.back();
+  }
+  return shapes;
 }
 
 }  // namespace
@@ -144,53 +162,62 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
   avatar.preset = "test";
   avatar.template_mode = options.template_mode;
   avatar.shape = options.shape;
-  avatar.fourier_octaves = options.fourier_octaves;
+  if (options.network_step != 1) avatar.uv_size = body.body().uv_size;
   avatar.decoding.sh_degree = options.sh_degree;
-  avatar.network = make_pose_unet(body.body().uv_size, kMapChannels + 4 * options.fourier_octaves,
-                                  options.channels, head_channels(options.sh_degree));
-
-  const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, false);
-  FIG_CHECK(shapes.ok(), shapes.status().message().c_str());
+  std::unique_ptr<RandomStaticPart> static_part;
+  if (options.static_part) {
+    static_part = std::make_unique<RandomStaticPart>(body.body(), options.seed);
+    avatar.static_part = static_part->part;
+  }
+  uint64_t macs = 0;
   std::vector<std::vector<float>> storage;
-  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
-    Layer& layer = avatar.network.layers[i];
-    if (layer.op != LayerOp::kConv2d) continue;
-    const bool is_head = i + 1 == avatar.network.layers.size();
-    const uint32_t fan_in = layer.kernel * layer.kernel * (*shapes)[layer.inputs[0]].channels;
-    std::vector<float> weights(size_t(layer.out_channels) * fan_in), bias(layer.out_channels);
-    const float deviation = std::sqrt(2.0f / static_cast<float>(fan_in)) * (is_head ? 0.3f : 1.0f);
-    for (float& weight : weights) weight = deviation * random.normal();
-    for (float& value : bias) value = 0.05f * random.normal();
-    if (is_head) {
-      for (int c = 0; c < 3; ++c)
-        bias[11 + c] = options.colour.empty() ? random.uniform(-1, 1) : options.colour[c];
-    }
-    storage.push_back(std::move(weights));
-    layer.weights = storage.back();
-    storage.push_back(std::move(bias));
-    layer.bias = storage.back();
-  }
   std::unique_ptr<QuantisedNetwork> quantised;
-  if (options.held != Held::kFloat32) {
-    quantised =
-        std::make_unique<QuantisedNetwork>(avatar.network, network_input(avatar, body.body()));
-    avatar.fixed_point = quantised->fixed;
-  }
-  if (options.held == Held::kFixedPoint) {
-    for (Layer& layer : avatar.network.layers) layer.weights = layer.bias = {};
+  if (options.network_step != 0) {
+    avatar.fourier_octaves = options.fourier_octaves;
+    avatar.network = make_pose_unet(body.body().uv_size / options.network_step,
+                                    kMapChannels + 4 * options.fourier_octaves, options.channels,
+                                    head_channels(options.sh_degree));
+    macs = count_macs(avatar.network, choose_weights(avatar.network, options, random, storage));
+    if (options.held != Held::kFloat32) {
+      const SyntheticPose bent = make_test_pose(body.body(), 1);
+      quantised = std::make_unique<QuantisedNetwork>(
+          avatar.network, network_input(avatar, body.body(), bent.view()));
+      avatar.fixed_point = quantised->fixed;
+    }
+    if (options.held == Held::kFixedPoint) {
+      for (Layer& layer : avatar.network.layers) layer.weights = layer.bias = {};
+    }
   }
   const SyntheticPose rest = make_test_pose(body.body(), 0);
   avatar.golden.rotations = rest.rotations;
   avatar.golden.camera = make_test_camera(64, 64);
 
   const Budget budget{.peak_memory_bytes = 64 << 20,
-                      .macs_per_frame = count_macs(avatar.network, *shapes),
+                      .macs_per_frame = macs,
                       .gaussians = body.body().texel_count()};
   const Result<std::vector<std::byte>> written = write_package(avatar, budget, provenance());
   FIG_CHECK(written.ok(), written.status().message().c_str());
   SyntheticAvatar result{.bytes = AlignedBytes(*written), .package = nullptr};
   result.package = open(result.bytes, "test avatar");
   return result;
+}
+
+std::vector<float> network_input(const Avatar& avatar, const Body& body, const PoseView& pose) {
+  const TexelGrid grid = make_texel_grid(body, avatar.network.input_size);
+  const uint32_t stride = avatar.network.input_channels;
+  std::vector<float> maps(size_t{body.uv_size} * body.uv_size * kMapChannels),
+      input(size_t{grid.size} * grid.size * stride);
+  std::vector<Affine> transforms(body.joint_count());
+  draw_pose_maps(body, pose, avatar.map_statistics, transforms, kMapChannels, maps);
+  draw_fourier_channels(grid.size, avatar.fourier_octaves, kMapChannels, stride, input);
+  const auto draw = [&](uint32_t cell, uint32_t source) {
+    std::copy_n(&maps[size_t{body.texel[source]} * kMapChannels], kMapChannels,
+                &input[size_t{cell} * stride]);
+  };
+  for (uint32_t i = 0; i < grid.cell_count(); ++i) draw(grid.cell[i], grid.source[i]);
+  for (size_t i = 0; i < grid.border_cell.size(); ++i)
+    draw(grid.border_cell[i], grid.source[grid.border_source[i]]);
+  return input;
 }
 
 SyntheticPose make_test_pose(const Body& body, uint32_t frame) {

@@ -64,6 +64,8 @@ struct SyntheticAvatarOptions {
       {};  // empty: a random one per avatar; otherwise the head's mean colour
   uint64_t seed = 1;
   Held held = Held::kFloat32;
+  uint32_t network_step = 1;  // texels a side of a cell of the network's grid; 0: no network
+  bool static_part = false;   // a RandomStaticPart
   std::string name = "test avatar";
 };
 
@@ -83,6 +85,10 @@ struct SyntheticPose {
   std::array<float, 3> root_translation_m{0, 0, 0};
 };
 SyntheticPose make_test_pose(const Body& body, uint32_t frame);
+
+// What an avatar's network reads in a pose, by the definition: the maps of all texels, of which
+// every cell has its source's, and Fourier channels. [T_n,T_n,channels].
+std::vector<float> network_input(const Avatar& avatar, const Body& body, const PoseView& pose);
 
 // A camera that sees the whole cylinder from +z.
 Camera make_test_camera(uint32_t width_px, uint32_t height_px, float azimuth_deg = 0);

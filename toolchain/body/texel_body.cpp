@@ -149,6 +149,10 @@ figurine::Body TexelBody::view() const {
   out.texel_shape_basis_m = shape_basis_m;
   out.border_texel = border_texel;
   out.border_source = border_source;
+  if (states_mesh_places) {
+    out.texel_triangle = triangle;
+    out.texel_barycentric = barycentric;
+  }
   return out;
 }
 

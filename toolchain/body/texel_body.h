@@ -29,9 +29,11 @@ struct TexelBody {
   std::vector<uint8_t> joints;
   std::vector<uint32_t> border_texel, border_source;
 
-  // How the texels came about: for tests, reports and the capture tool.
+  // How the texels came about: for tests, reports and the capture tool. A package holds it if the
+  // layout is not the mesh's own (states_mesh_places).
   std::vector<uint32_t> triangle;  // [N] the surface's triangle under each texel
   std::vector<float> barycentric;  // [N,3] weights of its three corners
+  bool states_mesh_places = false;
   double largest_lost_weight = 0;  // share of skin weight beyond K influences, at worst
   uint32_t most_influences = 0;    // joints that a texel hangs on before the cut to K, at most
 

@@ -1,6 +1,7 @@
 #include "toolchain/capture/capture.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdio>
 #include <exception>
@@ -10,6 +11,7 @@
 #include <thread>
 
 #include "toolchain/body/makehuman.h"
+#include "toolchain/body/skeleton.h"
 #include "toolchain/body/surface.h"
 #include "toolchain/capture/layout.h"
 #include "toolchain/capture/person.h"
@@ -27,6 +29,9 @@ namespace {
 
 constexpr uint64_t kIdentityStream = 4;
 constexpr uint32_t kFramingStride = 7;  // every seventh vertex shows how far the figure reaches
+constexpr std::array<uint8_t, 7> kBustJoints{body::kNeck,       body::kHead,    body::kLeftCollar,
+                                             body::kJaw,        body::kLeftEye, body::kRightEye,
+                                             body::kRightCollar};
 
 // One identity, ready to be photographed.
 struct Session {
@@ -43,12 +48,28 @@ struct Session {
   }
 };
 
+// Places that the figure reaches in any of its poses; of head and shoulders alone as well.
+struct Reached {
+  std::vector<Vec3> all, bust;
+};
+
+// What neck, head and collar bones move most: down to the collar bones and out to the shoulders.
+bool is_bust(const Mesh& mesh, uint32_t vertex) {
+  const float* weights = &mesh.skin_weights[size_t{vertex} * kSkinInfluences];
+  const uint8_t joint =
+      mesh.skin_joints[size_t{vertex} * kSkinInfluences +
+                       static_cast<size_t>(std::max_element(weights, weights + kSkinInfluences) -
+                                           weights)];
+  return std::find(kBustJoints.begin(), kBustJoints.end(), joint) != kBustJoints.end();
+}
+
 // Moves every pose until its lowest point touches y = 0 and the middle of its outline stands over
 // the origin, so that neither jumps nor leaning cost image size, and returns where the figure then
-// reaches in any of its poses.
-std::vector<Vec3> place_poses(Session& session, const Body& body) {
+// reaches.
+Reached place_poses(Session& session, const Body& body) {
   std::vector<float> position, weights;
   std::vector<uint8_t> joints;
+  std::vector<bool> bust;
   for (const Mesh& mesh : session.person.meshes) {
     for (uint32_t v = 0; v < mesh.vertex_count(); v += kFramingStride) {
       position.insert(position.end(), &mesh.position_m[v * 3], &mesh.position_m[v * 3] + 3);
@@ -56,9 +77,10 @@ std::vector<Vec3> place_poses(Session& session, const Body& body) {
                     &mesh.skin_joints[v * kSkinInfluences] + kSkinInfluences);
       weights.insert(weights.end(), &mesh.skin_weights[v * kSkinInfluences],
                      &mesh.skin_weights[v * kSkinInfluences] + kSkinInfluences);
+      bust.push_back(is_bust(mesh, v));
     }
   }
-  std::vector<Vec3> points;
+  Reached points;
   for (size_t f = 0; f < session.sequence.size(); ++f) {
     const std::vector<float> posed =
         body::skin_positions(position, joints, weights, session.transforms(f, body));
@@ -72,7 +94,10 @@ std::vector<Vec3> place_poses(Session& session, const Body& body) {
     const Vec3 shift{-(low.x + high.x) / 2, -low.y, -(low.z + high.z) / 2};
     std::array<float, 3>& translation = session.sequence[f].pose.root_translation_m;
     translation = {translation[0] + shift.x, translation[1] + shift.y, translation[2] + shift.z};
-    for (size_t i = 0; i < posed.size(); i += 3) points.push_back(load(&posed[i]) + shift);
+    for (size_t i = 0; i < posed.size(); i += 3) {
+      points.all.push_back(load(&posed[i]) + shift);
+      if (bust[i / 3]) points.bust.push_back(points.all.back());
+    }
   }
   return points;
 }
@@ -91,7 +116,8 @@ Session prepare(const CaptureRequest& request, uint32_t identity, const Package&
   const std::array<float, 3> root{session.joints_m[0], session.joints_m[1], session.joints_m[2]};
   session.sequence =
       make_sequence(motions, {.frames = request.frames, .seed = person.seed, .root_rest_m = root});
-  session.cameras = make_camera_rings(request.cameras, place_poses(session, body));
+  const Reached reached = place_poses(session, body);
+  session.cameras = make_camera_rings(request.cameras, reached.all, reached.bust);
   session.record = {.identity = identity,
                     .seed = request.seed,
                     .tool = request.tool,
@@ -189,7 +215,8 @@ CaptureEnd capture_identities(const CaptureRequest& request, const Package& pack
     throw InputError("--body: captures are made of a makehuman or mannequin body, not of '" +
                      body.name + "'");
   }
-  Tally tally(callback, uint64_t{request.identities} * request.frames * request.cameras.views);
+  Tally tally(callback, uint64_t{request.identities} * request.frames *
+                            (request.cameras.views + request.cameras.bust_views));
   for (uint32_t i = 0; i < request.identities && !tally.stopped(); ++i) {
     const uint32_t identity = request.first_identity + i;
     const Session session =
@@ -208,7 +235,7 @@ CaptureEnd capture_identities(const CaptureRequest& request, const Package& pack
 namespace {
 
 // Cells of a sheet: images over mid-grey, cut to their middle, because the sides of a square image
-// of a standing figure are empty.
+// of a standing figure are empty; smaller images lie in the middle of their cells.
 class Sheet {
  public:
   Sheet(uint32_t columns, uint32_t rows, const Camera& size)
@@ -219,11 +246,17 @@ class Sheet {
     std::fill(image_.pixels.begin(), image_.pixels.end(), uint8_t{kGrey});
   }
 
-  void put(size_t cell, const dataset::CaptureImage& image, uint32_t image_width) {
-    const uint32_t cut = (image_width - width_) / 2;
+  void put(size_t cell, const dataset::CaptureImage& image) {
+    const int left = (static_cast<int>(image.width_px) - static_cast<int>(width_)) / 2,
+              top = (static_cast<int>(image.height_px) - static_cast<int>(height_)) / 2;
     for (uint32_t y = 0; y < height_; ++y) {
       for (uint32_t x = 0; x < width_; ++x) {
-        const size_t from = size_t{y} * image_width + x + cut;
+        const int from_x = static_cast<int>(x) + left, from_y = static_cast<int>(y) + top;
+        if (from_x < 0 || from_y < 0 || from_x >= static_cast<int>(image.width_px) ||
+            from_y >= static_cast<int>(image.height_px))
+          continue;
+        const size_t from =
+            static_cast<size_t>(from_y) * image.width_px + static_cast<size_t>(from_x);
         uint8_t* to = image_.at(static_cast<uint32_t>(cell % columns_) * width_ + x,
                                 static_cast<uint32_t>(cell / columns_) * height_ + y);
         for (int c = 0; c < 3; ++c) {
@@ -242,7 +275,7 @@ class Sheet {
   ports::ImageU8 image_;
 };
 
-// The camera that the figure's chest looks at most nearly.
+// The camera of whole bodies that the figure's chest looks at most nearly.
 size_t front_camera(const dataset::Dataset& data, size_t frame) {
   const std::array<float, 9> turn =
       rotation_from_quaternion(data.frames()[frame].pose().rotations.data());
@@ -250,6 +283,7 @@ size_t front_camera(const dataset::Dataset& data, size_t frame) {
   size_t best = 0;
   float most = -2;
   for (size_t c = 0; c < data.cameras().size(); ++c) {
+    if (data.cameras()[c].framing != dataset::Framing::kBody) continue;
     const auto& m = data.cameras()[c].camera.view_from_world;
     const float facing =
         -dot(front, Vec3{m[8], m[9], m[10]});  // the third row is the camera's own direction
@@ -267,8 +301,7 @@ ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t col
                cells = size_t{columns} * rows;
   Sheet sheet(columns, rows, data.cameras()[0].camera);
   for (size_t i = 0; i < cells; ++i) {
-    sheet.put(i, data.load_image(i * frames / cells, (i * 7 + i / columns) % cameras),
-              data.cameras()[0].camera.width_px);
+    sheet.put(i, data.load_image(i * frames / cells, (i * 7 + i / columns) % cameras));
   }
   return sheet.take();
 }
@@ -284,7 +317,7 @@ ports::ImageU8 people_sheet(const std::vector<std::string>& identity_directories
                     static_cast<uint32_t>((identity_directories.size() + columns - 1) / columns),
                     size);
     const size_t frame = i % data.frames().size();
-    sheet->put(i, data.load_image(frame, front_camera(data, frame)), size.width_px);
+    sheet->put(i, data.load_image(frame, front_camera(data, frame)));
   }
   return sheet->take();
 }

@@ -187,12 +187,7 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
                       {"excluded_skins", record.limits.excluded_skins},
                       {"hair", record.limits.hair}};
   about_["sources"] = record.sources;
-  const dataset::Split split = dataset::default_split(static_cast<uint32_t>(sequence.size()),
-                                                      static_cast<uint32_t>(cameras.size()));
-  about_["held_out_cameras"] = ordered_json::array();
-  for (size_t c = 0; c < cameras.size(); ++c) {
-    if (split.held_out_camera[c]) about_["held_out_cameras"].push_back(cameras[c].name);
-  }
+  describe_cameras();
   about_["joints"] = body::joint_names();
   about_["frames"] = ordered_json::array();
   for (size_t f = 0; f < sequence.size(); ++f) {
@@ -204,6 +199,24 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
                                 {"heading_rad", decimal(captured.heading_rad)},
                                 {"root_translation_m", decimals(captured.pose.root_translation_m)},
                                 {"rotations", decimals(captured.pose.rotations)}});
+  }
+}
+
+// Each framing holds cameras out by itself: bust cameras change nothing for the others.
+void IdentityLayout::describe_cameras() {
+  about_["held_out_cameras"] = ordered_json::array();
+  for (const dataset::Framing framing : {dataset::Framing::kBody, dataset::Framing::kBust}) {
+    std::vector<std::string> names;
+    for (const RingCamera& camera : cameras_) {
+      if (camera.framing == framing) names.push_back(camera.name);
+    }
+    const dataset::Split split = dataset::default_split(static_cast<uint32_t>(sequence_.size()),
+                                                        static_cast<uint32_t>(names.size()));
+    for (size_t c = 0; c < names.size(); ++c) {
+      if (split.held_out_camera[c]) about_["held_out_cameras"].push_back(names[c]);
+    }
+    // Nothing is said where there are none, as before there were such cameras.
+    if (framing == dataset::Framing::kBust && !names.empty()) about_["bust_cameras"] = names;
   }
 }
 
@@ -265,7 +278,9 @@ void IdentityLayout::begin(bool resume) {
         {"translation", translation}};
   }
   write_json(directory_ + "/camera_extrinsics.json", extrinsics);
-  const Camera& one = cameras_[0].camera;  // the cameras share their intrinsics
+  // The cameras share their lens: of images of another size than the first one's, intrinsics are in
+  // proportion.
+  const Camera& one = cameras_[0].camera;
   const double fx = 2 * decimal(one.fx_px), fy = 2 * decimal(one.fy_px),
                cx = 2 * decimal(one.cx_px), cy = 2 * decimal(one.cy_px);
   write_json(directory_ + "/camera_intrinsics.json",

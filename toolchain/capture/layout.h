@@ -43,6 +43,7 @@ class IdentityLayout {
   void finish() const;
 
  private:
+  void describe_cameras();
   std::string image_path(size_t frame, size_t camera) const;
   std::string mask_path(size_t frame, size_t camera) const;
   void write_json(const std::string& path, const nlohmann::ordered_json& value) const;

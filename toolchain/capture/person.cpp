@@ -7,6 +7,7 @@
 
 #include "toolchain/body/makehuman_model.h"
 #include "toolchain/body/mannequin.h"
+#include "toolchain/body/skin.h"
 #include "toolchain/body/texel_body.h"
 #include "toolchain/capture/cloth_strength.h"
 #include "toolchain/capture/cover.h"
@@ -143,23 +144,56 @@ class Dresser {
 
 }  // namespace
 
-ShapeFit fit_shape(const Body& body, const body::Surface& surface,
-                   const body::JointPositions& joints) {
-  body::BodyModel own;
-  own.name = "person";
-  own.surface = surface;
-  own.joint_m = joints;
-  const body::TexelBody texels = body::make_texel_body(own, body.uv_size);
-  if (!std::equal(texels.texel.begin(), texels.texel.end(), body.texel.begin(), body.texel.end())) {
-    throw InputError("--body: its texels are not those of this mesh; was it made from other data?");
+namespace {
+
+// [N,3] where the body's texels lie on a person's surface. A body that does not state their places
+// on the mesh has the mesh's own layout.
+std::vector<float> texel_positions(const Body& body, const body::Surface& surface) {
+  constexpr const char* kOtherMesh =
+      "--body: its texels are not those of this mesh; was it made from other data?";
+  if (body.texel_triangle.empty()) {
+    body::BodyModel own;
+    own.name = "person";
+    own.surface = surface;
+    body::TexelBody texels = body::make_texel_body(own, body.uv_size);
+    if (!std::ranges::equal(texels.texel, body.texel)) throw InputError(kOtherMesh);
+    return std::move(texels.position_m);
   }
+  std::vector<float> position_m;
+  position_m.reserve(size_t{body.texel_count()} * 3);
+  for (size_t row = 0; row < body.texel_count(); ++row) {
+    const uint32_t triangle = body.texel_triangle[row];
+    if (triangle >= surface.triangle_count()) throw InputError(kOtherMesh);
+    double position[3] = {0, 0, 0};
+    body::SkinAccumulator skin;
+    for (size_t c = 0; c < 3; ++c) {
+      const size_t vertex = surface.triangles[3 * size_t{triangle} + c];
+      const double weight = body.texel_barycentric[3 * row + c];
+      for (size_t i = 0; i < 3; ++i) position[i] += weight * surface.position_m[3 * vertex + i];
+      for (size_t k = vertex * kSkinInfluences; k < (vertex + 1) * kSkinInfluences; ++k)
+        skin.add(surface.skin_joints[k], weight * double{surface.skin_weights[k]});
+    }
+    uint8_t joints[kSkinInfluences];
+    float weights[kSkinInfluences];
+    skin.store(joints, weights);
+    if (std::fabs(weights[0] - body.texel_weights[row * kSkinInfluences]) > 1e-4f)
+      throw InputError(kOtherMesh);
+    for (double value : position) position_m.push_back(static_cast<float>(value));
+  }
+  return position_m;
+}
+
+}  // namespace
+
+ShapeFit fit_shape(const Body& body, const body::Surface& surface) {
+  const std::vector<float> position_m = texel_positions(body, surface);
   const Eigen::Index rows = static_cast<Eigen::Index>(body.texel_count()) * 3,
                      count = body.shape_count();
   using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic>;
   const Eigen::Map<const Matrix> basis(body.texel_shape_basis_m.data(), rows,
                                        count);  // [S,N,3] row-major is [3N,S] column-major
   const Eigen::VectorXf wanted =
-      Eigen::Map<const Eigen::VectorXf>(texels.position_m.data(), rows) -
+      Eigen::Map<const Eigen::VectorXf>(position_m.data(), rows) -
       Eigen::Map<const Eigen::VectorXf>(body.texel_position_m.data(), rows);
   const Eigen::MatrixXd wide = basis.cast<double>();
   const Eigen::VectorXd right = wide.transpose() * wanted.cast<double>();
@@ -214,8 +248,7 @@ Person make_makehuman_person(const PersonRequest& request, const body::MakeHuman
   Person person;
   person.meshes = dresser.take();
   person.meshes.push_back(std::move(skin));
-  const ShapeFit fit =
-      fit_shape(body, makehuman.body_surface(vertices_m), makehuman.joints(vertices_m));
+  const ShapeFit fit = fit_shape(body, makehuman.body_surface(vertices_m));
   person.shape = fit.shape;
   person.shape_error_m = fit.error_m;
   person.description = {{"gender", text(shape.gender)},

@@ -34,7 +34,6 @@ struct ShapeFit {
   std::vector<float> shape;  // [S]
   double error_m = 0;
 };
-ShapeFit fit_shape(const Body& body, const body::Surface& surface,
-                   const body::JointPositions& joints);
+ShapeFit fit_shape(const Body& body, const body::Surface& surface);
 
 }  // namespace figurine::capture

@@ -55,12 +55,19 @@ nlohmann::json report_head(const EvaluateArguments& arguments, const train::Trai
 }
 
 void print_group(const char* title, const nlohmann::json& group) {
-  const auto number = [&](const char* key) {
+  const auto number = [&](const std::string& key) {
     return group.at(key).is_number() ? group.at(key).get<double>() : NAN;
   };
-  std::printf("%-22s %6.2f dB  flat %6.2f  crop %6.2f  head %6.2f  high-pass %.2f  (%d images)\n",
-              title, number("psnr_db"), number("flat_psnr_db"), number("crop_psnr_db"),
-              number("head_psnr_db"), number("highpass_ratio"), group.at("images").get<int>());
+  for (const std::string prefix : {"", "bust_"}) {
+    if (!group.contains(prefix + "images")) continue;
+    std::printf(
+        "%-22s %6.2f dB  flat %6.2f  head %6.2f  high-pass %.2f, correlation %.2f  filled %.4f  "
+        "(%d images)\n",
+        prefix.empty() ? title : "    close-ups", number(prefix + "psnr_db"),
+        number(prefix + "flat_psnr_db"), number(prefix + "head_psnr_db"),
+        number(prefix + "highpass_ratio"), number(prefix + "highpass_correlation"),
+        number(prefix + "filled_share"), group.at(prefix + "images").get<int>());
+  }
 }
 
 void print_parts(const nlohmann::json& parts) {

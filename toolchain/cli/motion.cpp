@@ -7,6 +7,7 @@
 #include "formats/writer/package_writer.h"
 #include "ports/host/files.h"
 #include "toolchain/body/clip.h"
+#include "toolchain/body/gaze.h"
 #include "toolchain/body/motion_loop.h"
 #include "toolchain/body/retarget.h"
 #include "toolchain/cli/commands.h"
@@ -27,9 +28,12 @@ struct MotionOptions {
   std::string up = "z";
   uint32_t loop_cycles = 0;
   bool in_place = false;
+  float head_pitch_deg = 0;
 };
 
-void run_motion(MotionOptions options, bool has_start, bool has_frames) {
+constexpr float kDegrees = 57.29578f;
+
+void run_motion(MotionOptions options, bool has_start, bool has_frames, bool has_head_pitch) {
   const ports::MappedFile file = value_or_throw(ports::MappedFile::open(options.body), "--body");
   const Package package = value_or_throw(Package::open(file.bytes(), options.body), "--body");
   if (package.kind() != PackageKind::kBody)
@@ -55,8 +59,11 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
     clip =
         body::make_loop(clip, {.cycles = options.loop_cycles, .in_place = options.in_place}, &loop);
     std::printf("cycle of %u frames from frame %u of the result, gap %.1f degrees\n", loop.length,
-                loop.first_frame, 57.29578 * double{loop.gap_rad});
+                loop.first_frame, double{kDegrees * loop.gap_rad});
   }
+
+  if (has_head_pitch) clip = body::with_head_pitch(clip, options.head_pitch_deg / kDegrees);
+  const body::HeadPitch pitch = body::measure_head_pitch(clip);
 
   Provenance provenance;
   provenance.tool = "figurine-train " FIGURINE_VERSION;
@@ -68,6 +75,8 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
       {"loop_cycles", std::to_string(options.loop_cycles)},
       {"smooth_s", std::to_string(retarget.smooth_s.value_or(
                        extension == ".glb" ? 0 : body::kCaptureSmoothS))}};
+  if (has_head_pitch)
+    provenance.settings.push_back({"head_pitch_deg", std::to_string(options.head_pitch_deg)});
   if (extension == ".glb")
     provenance.settings.push_back({"animation", std::to_string(retarget.animation)});
   provenance.sources = {options.source.empty() ? body::clip_source(options.clip) : options.source};
@@ -76,11 +85,12 @@ void run_motion(MotionOptions options, bool has_start, bool has_frames) {
   std::printf(
       "%s: %u frames at %g a second, soles in contact %.1f mm from the ground on average (lowest "
       "%.1f), largest step of a joint %.1f "
-      "degrees, %zu "
+      "degrees, head pitched by %.0f degrees (%.0f to %.0f), %zu "
       "bytes\n",
       options.output.c_str(), clip.frame_count, double{clip.frames_per_second},
       1e3 * double{report.mean_contact_m}, 1e3 * double{report.lowest_sole_m},
-      57.29578 * double{report.largest_step_rad}, bytes.size());
+      double{kDegrees * report.largest_step_rad}, double{kDegrees * pitch.mean_rad},
+      double{kDegrees * pitch.lowest_rad}, double{kDegrees * pitch.highest_rad}, bytes.size());
 }
 
 }  // namespace
@@ -124,10 +134,18 @@ void add_motion_command(CLI::App& app) {
                                        "Repeat the best gait cycle this often, straight ahead")
                           ->check(CLI::Range(1u, 1000u));
   command->add_flag("--in-place", options->in_place, "With --loop: walk on the spot")->needs(loop);
+  const CLI::Option* head_pitch =
+      command
+          ->add_option(
+              "--head-pitch", options->head_pitch_deg,
+              "Turn neck and head, by one angle for the whole clip, until the face looks up "
+              "by this many degrees on average; 0: ahead; default: as captured")
+          ->check(CLI::Range(-80.0f, 80.0f));
   command->add_option("--source", options->source,
                       "Provenance line: where the clip is from and under which terms");
-  command->callback(
-      [options, start, frames] { run_motion(*options, start->count() > 0, frames->count() > 0); });
+  command->callback([options, start, frames, head_pitch] {
+    run_motion(*options, start->count() > 0, frames->count() > 0, head_pitch->count() > 0);
+  });
 }
 
 }  // namespace figurine::cli

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <set>
 
 #include "ports/host/files.h"
 #include "ports/media/png.h"
@@ -280,7 +279,7 @@ class Dataset::Reading {
     read_frames();
     match_files();
     if (own_) {
-      take_marked_split();
+      take_marked_cameras();
     } else {
       split_by_rule();
     }
@@ -343,10 +342,24 @@ class Dataset::Reading {
       }
       const ImageSize size = list_images(name);
       CaptureCamera camera{name, read_camera(extrinsics[key], intrinsics, scale, size)};
+      if (own_) scale_intrinsics(camera.camera);
       check_principal_point(camera, intrinsics_path);
       set_.cameras_.push_back(std::move(camera));
     }
     if (set_.cameras_.empty()) throw InputError(set_.directory_ + ": no usable camera");
+  }
+
+  // The intrinsics are those of images of the size that the description names; close-ups have the
+  // same lens and may have images of another size.
+  void scale_intrinsics(Camera& camera) const {
+    if (!about_.has("bust_cameras")) return;
+    const double width = about_["image"]["width"].number(),
+                 height = about_["image"]["height"].number();
+    if (!(width >= 1 && height >= 1)) about_["image"].fail("not the size of an image");
+    camera.fx_px = static_cast<float>(camera.fx_px * camera.width_px / width);
+    camera.cx_px = static_cast<float>(camera.cx_px * camera.width_px / width);
+    camera.fy_px = static_cast<float>(camera.fy_px * camera.height_px / height);
+    camera.cy_px = static_cast<float>(camera.cy_px * camera.height_px / height);
   }
 
   // A camera's key is "NUMBER_NAME.png".
@@ -474,12 +487,26 @@ class Dataset::Reading {
     }
   }
 
-  void take_marked_split() {
-    std::set<std::string> held_out;
-    for (const JsonField& name : about_["held_out_cameras"].items()) held_out.insert(name.text());
-    for (CaptureCamera& camera : set_.cameras_) camera.held_out = held_out.erase(camera.name) != 0;
-    if (!held_out.empty())
-      about_["held_out_cameras"].fail("no camera is called '" + *held_out.begin() + "'");
+  // Which cameras are held out, and which hold head and shoulders only (captures from before there
+  // were such cameras say nothing of them).
+  void take_marked_cameras() {
+    mark_cameras("held_out_cameras", [](CaptureCamera& camera) { camera.held_out = true; });
+    if (about_.has("bust_cameras")) {
+      mark_cameras("bust_cameras", [](CaptureCamera& camera) { camera.framing = Framing::kBust; });
+    }
+  }
+
+  // mark(camera) for every camera that the field names.
+  template <class Mark>
+  void mark_cameras(const char* field, const Mark& mark) {
+    for (const JsonField& name : about_[field].items()) {
+      const std::string wanted = name.text();
+      const auto found =
+          std::find_if(set_.cameras_.begin(), set_.cameras_.end(),
+                       [&](const CaptureCamera& camera) { return camera.name == wanted; });
+      if (found == set_.cameras_.end()) about_[field].fail("no camera is called '" + wanted + "'");
+      mark(*found);
+    }
   }
 
   void split_by_rule() {

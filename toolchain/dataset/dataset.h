@@ -6,8 +6,8 @@
 //   ID/fmask_lr/CAM/0005_img_fmask.png   foreground mask; soft alpha in our captures
 //   ID/camera_extrinsics.json, ID/camera_intrinsics.json, ID/camera_scale.pkl
 //   ID/smplx/smpl/000000.json            pose of frame 5: index = frame / 5 - 1
-//   ID/figurine.json                     ours only: seed, body, shape, splits, and full poses (87
-//       numbers cannot hold two hands)
+//   ID/figurine.json                     ours only: seed, body, shape, splits, framing, and full
+//       poses (87 numbers cannot hold two hands)
 //
 // What a user of that data set stumbles over is handled here, once: intrinsics are halved,
 // translations are multiplied by the camera scale (a pickled float, parsed without unpickling),
@@ -43,12 +43,16 @@ enum class Role : uint8_t {
 };
 const char* to_string(Role role);
 
+// How much of the person a camera holds: everything in every pose, or head and shoulders, whatever
+// the image's border cuts off.
+enum class Framing : uint8_t { kBody, kBust };
+
 enum class FrameSplit : uint8_t { kTrain, kInterleaved, kBlock };
 
 // Which frames and cameras are held out. The same rule serves captures and data without
 // figurine.json: a block of 7 consecutive frames at two thirds of the sequence, every 13th of the
 // others, and 4 cameras spread over the list (fewer where there are few: one in six, one in
-// thirteen).
+// thirteen). Captures apply it to the cameras of each framing by themselves.
 struct Split {
   std::vector<FrameSplit> frames;     // [F]
   std::vector<bool> held_out_camera;  // [V]
@@ -59,6 +63,7 @@ struct CaptureCamera {
   std::string name;  // folder below images_lr
   Camera camera;     // at the size of the stored images
   bool held_out = false;
+  Framing framing = Framing::kBody;  // where nothing is said, as in MVHumanNet, kBody
 };
 
 struct CaptureFrame {

@@ -10,6 +10,9 @@ namespace figurine::measure {
 
 namespace {
 
+constexpr uint8_t kOpaqueAlpha = 250;  // 249/255 < 0.98 < 250/255
+constexpr int kErosion_px = 3;         // of the mask, where holes are looked for
+
 void check_sizes(const Picture& a, const Picture& b) {
   FIG_CHECK(
       a.width_px == b.width_px && a.height_px == b.height_px && a.rgba.size() == b.rgba.size(),
@@ -29,6 +32,26 @@ Box clip(const Box& box, const Picture& picture) {
 float over_grey(const Picture& picture, size_t pixel, int channel) {
   const uint8_t* p = &picture.rgba[4 * pixel];
   return (static_cast<float>(p[channel]) + static_cast<float>(255 - p[3]) * kMidGrey) / 255.0f;
+}
+
+// Whether all pixels up to `reach` away in x and y are foreground. They must be in the picture.
+bool is_foreground_around(const Picture& truth, int x, int y, int reach) {
+  for (int j = y - reach; j <= y + reach; ++j) {
+    for (int i = x - reach; i <= x + reach; ++i) {
+      if (!is_foreground(truth, size_t(j) * truth.width_px + i)) return false;
+    }
+  }
+  return true;
+}
+
+// The pixel minus the mean of its 3x3 neighbourhood, which must be in the picture.
+double high_pass_at(const Picture& picture, int x, int y, int channel) {
+  double sum = 0;
+  for (int j = y - 1; j <= y + 1; ++j) {
+    for (int i = x - 1; i <= x + 1; ++i)
+      sum += over_grey(picture, size_t(j) * picture.width_px + i, channel);
+  }
+  return over_grey(picture, size_t(y) * picture.width_px + x, channel) - sum / 9;
 }
 
 }  // namespace
@@ -143,35 +166,34 @@ HighPass high_pass(const Picture& prediction, const Picture& truth, const Box& i
   const int width = static_cast<int>(truth.width_px), height = static_cast<int>(truth.height_px);
   box = {std::max(box.x0, 1), std::max(box.y0, 1), std::min(box.x1, width - 1),
          std::min(box.y1, height - 1)};
-  constexpr int kBinomial[3] = {1, 2, 1};
   HighPass energy;
   for (int y = box.y0; y < box.y1; ++y) {
     for (int x = box.x0; x < box.x1; ++x) {
-      bool inner = true;
-      for (int j = -1; j <= 1 && inner; ++j) {
-        for (int i = -1; i <= 1 && inner; ++i)
-          inner = is_foreground(truth, size_t(y + j) * width + (x + i));
-      }
-      if (!inner) continue;
+      if (!is_foreground_around(truth, x, y, 1)) continue;
       for (int c = 0; c < 3; ++c) {
-        double blur[2] = {0, 0};
-        for (int j = -1; j <= 1; ++j) {
-          for (int i = -1; i <= 1; ++i) {
-            const size_t pixel = size_t(y + j) * width + (x + i);
-            const double weight = kBinomial[j + 1] * kBinomial[i + 1] / 16.0;
-            blur[0] += weight * over_grey(prediction, pixel, c);
-            blur[1] += weight * over_grey(truth, pixel, c);
-          }
-        }
-        const size_t centre = size_t(y) * width + x;
-        const double high[2] = {over_grey(prediction, centre, c) - blur[0],
-                                over_grey(truth, centre, c) - blur[1]};
-        energy.prediction += high[0] * high[0];
-        energy.truth += high[1] * high[1];
+        const double predicted = high_pass_at(prediction, x, y, c),
+                     actual = high_pass_at(truth, x, y, c);
+        energy.add({.prediction = predicted * predicted,
+                    .truth = actual * actual,
+                    .product = predicted * actual});
       }
     }
   }
   return energy;
+}
+
+Filled count_filled(const Picture& prediction, const Picture& truth) {
+  check_sizes(prediction, truth);
+  Filled filled;
+  for (int y = kErosion_px; y < static_cast<int>(truth.height_px) - kErosion_px; ++y) {
+    for (int x = kErosion_px; x < static_cast<int>(truth.width_px) - kErosion_px; ++x) {
+      const size_t alpha = (size_t(y) * truth.width_px + x) * 4 + 3;
+      if (truth.rgba[alpha] < kOpaqueAlpha || !is_foreground_around(truth, x, y, kErosion_px))
+        continue;
+      filled.add({.inside = 1, .filled = prediction.rgba[alpha] >= kOpaqueAlpha});
+    }
+  }
+  return filled;
 }
 
 void FlatColour::add(const Picture& truth) {

@@ -8,9 +8,13 @@
 //   crop        all pixels of the bounding box of true alpha > 0, over black: flattered by the
 //               black around the person, never a target.
 //   head        foreground pixels inside the projected head box.
-//   high-pass   sum of squares of (picture - 3x3 binomial blur) over foreground pixels whose eight
-//               neighbours are foreground too: prediction over truth. 1 is as sharp as the truth; a
-//               blurred face passes PSNR and fails this.
+//   high-pass   h = picture - mean of its 3x3 neighbourhood, over foreground pixels whose eight
+//               neighbours are foreground too. Ratio: sum of h^2, prediction over truth; 1 is as
+//               sharp as the truth, a blurred face passes PSNR and fails this. Correlation: sum of
+//               h h' over the root of the product of both energies; noise passes the ratio and
+//               fails this.
+//   filled      share of the pixels deep inside the person (foreground 3 pixels around, opaque
+//               themselves) where the prediction covers at least 0.98: the rest are holes.
 //   difference  PSNR of (frame t+1 - frame t), prediction against truth, over pixels that are
 //               foreground in both true frames: shimmer.
 //   outline     true alpha above 0.5 against predicted: intersection over union, and the share of
@@ -21,7 +25,9 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -91,14 +97,36 @@ Outline compare_outlines(const Picture& prediction, const Picture& truth);
 struct HighPass {
   double prediction = 0;  // energies
   double truth = 0;
+  double product = 0;  // sum of the prediction's value times the truth's
   void add(const HighPass& other) {
     prediction += other.prediction;
     truth += other.truth;
+    product += other.product;
   }
   double ratio() const { return truth > 0 ? prediction / truth : 0; }
+  // In [-1,1]; 0 where either has no energy.
+  double correlation() const {
+    return prediction > 0 && truth > 0 ? product / std::sqrt(prediction * truth) : 0;
+  }
 };
 HighPass high_pass(const Picture& prediction, const Picture& truth);
 HighPass high_pass(const Picture& prediction, const Picture& truth, const Box& inside);
+
+// How well the prediction closes the person's inside.
+struct Filled {
+  uint64_t inside = 0;  // pixels that are looked at
+  uint64_t filled = 0;  // of those, how many the prediction covers
+  void add(const Filled& other) { inside += other.inside, filled += other.filled; }
+  // No pixel: NaN.
+  double share() const {
+    return inside == 0 ? std::numeric_limits<double>::quiet_NaN()
+                       : static_cast<double>(filled) / static_cast<double>(inside);
+  }
+};
+// Looked at are pixels whose whole neighbourhood of 7x7 lies in the picture and in the foreground:
+// an outline that is off by less is an error of its own (compare_outlines), and no hole. And whose
+// own true alpha is at least 0.98: hair that can be seen through has nothing to fill.
+Filled count_filled(const Picture& prediction, const Picture& truth);
 
 // The error of the best single colour c: sum over foreground of (true - (a c + (1 - a) grey))^2,
 // minimised over c at the end.

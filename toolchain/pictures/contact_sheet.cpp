@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "toolchain/error.h"
 #include "toolchain/pictures/avatar_pictures.h"
+#include "toolchain/train/facing.h"
 
 namespace figurine::pictures {
 
@@ -16,7 +18,8 @@ using measure::Picture;
 namespace {
 
 constexpr int kGap_px = 4;
-constexpr float kPersonMargin = 0.03f, kDetailMargin = 0.25f;  // of the box's side
+// Of the box's side. A head and half of it on each side are head and shoulders.
+constexpr float kPersonMargin = 0.03f, kBustMargin = 0.5f, kDetailMargin = 0.25f;
 
 // The box grown to width = aspect * height around its centre, then by the margin.
 Box framed(const Box& box, float aspect, float margin) {
@@ -63,25 +66,13 @@ void paste(const Picture& picture, const Box& box, ports::ImageU8& sheet, uint32
   }
 }
 
-// How straight the person looks into the camera: the cosine between the head's forward axis and the
-// way to the camera.
-float facing(const train::TrainedAvatar& avatar, size_t frame, const Camera& camera) {
-  const train::OwnedPose pose = avatar.model().from_capture(avatar.data().frames()[frame]);
-  const Affine head = avatar.model().pose(pose.view()).world_from_rest[head_joints().front()];
-  const auto& m = camera.view_from_world;
-  float dot = 0;
-  for (int k = 0; k < 3; ++k)
-    dot -= head.m[4 * k + 2] *
-           m[8 + k];  // rest forward is +z; the camera looks along its own third row
-  return dot;
-}
-
 std::vector<std::pair<size_t, size_t>> choose_pictures(const train::TrainedAvatar& avatar,
                                                        size_t count) {
   const dataset::Dataset& data = avatar.data();
   std::vector<std::pair<size_t, size_t>> both, any;
   for (size_t frame = 0; frame < data.frames().size(); ++frame) {
     for (size_t camera = 0; camera < data.cameras().size(); ++camera) {
+      if (data.cameras()[camera].framing != dataset::Framing::kBody) continue;
       const dataset::Role role = data.role(frame, camera);
       if (role == dataset::Role::kHeldOutViewAndPose) both.emplace_back(frame, camera);
       if (role != dataset::Role::kTrain) any.emplace_back(frame, camera);
@@ -103,7 +94,8 @@ std::vector<std::pair<size_t, size_t>> choose_pictures(const train::TrainedAvata
     size_t pick = starts[at] + i % (end - starts[at]);
     for (size_t k = starts[at]; i % 2 == 0 && k < end; ++k) {
       const auto sees = [&](size_t candidate) {
-        return facing(avatar, from[candidate].first, data.cameras()[from[candidate].second].camera);
+        return train::facing(avatar.body(), data.frames()[from[candidate].first],
+                             data.cameras()[from[candidate].second].camera);
       };
       if (sees(k) > sees(pick)) pick = k;
     }
@@ -112,57 +104,111 @@ std::vector<std::pair<size_t, size_t>> choose_pictures(const train::TrainedAvata
   return chosen;
 }
 
+// One picture beside the truth, and the boxes of it that are shown.
+struct Pair {
+  Picture truth, prediction;
+  Box person, face, hand;
+};
+
+Pair make_pair(train::TrainedAvatar& avatar, const PosedFrame& posed, size_t frame, size_t camera) {
+  const Camera& view = avatar.data().cameras()[camera].camera;
+  Pair pair{.truth = true_picture(avatar.data(), frame, camera),
+            .prediction = render_picture(avatar, posed, view),
+            .person = {},
+            .face = {},
+            .hand = {}};
+  pair.person = bounding_box(pair.truth);
+  if (pair.person.empty()) pair.person = {0, 0, int(view.width_px), int(view.height_px)};
+  pair.face = projected_box(avatar.model(), posed.posed, view, head_joints(), 0);
+  pair.hand = projected_box(avatar.model(), posed.posed, view, left_hand_joints(), 0);
+  return pair;
+}
+
+// The camera of head and shoulders that sees most of the face, of those whose picture of this frame
+// is held out.
+std::optional<size_t> bust_camera(const train::TrainedAvatar& avatar, size_t frame) {
+  const dataset::Dataset& data = avatar.data();
+  std::optional<size_t> best;
+  float most = -2;
+  for (size_t camera = 0; camera < data.cameras().size(); ++camera) {
+    if (data.cameras()[camera].framing != dataset::Framing::kBust ||
+        data.role(frame, camera) == dataset::Role::kTrain)
+      continue;
+    const float sees =
+        train::facing(avatar.body(), data.frames()[frame], data.cameras()[camera].camera);
+    if (sees > most) best = camera, most = sees;
+  }
+  return best;
+}
+
+// What stands in one column of the sheet: the same pose as a whole, from near by, and in detail.
+struct Column {
+  Pair body;
+  std::optional<Pair> bust;
+};
+
+struct Rows {
+  uint32_t tile_width, detail_width;
+  bool busts;  // there is a row of them, of square tiles
+};
+
+void paste_column(const Column& column, int side, const ContactSheetOptions& options,
+                  const Rows& rows, uint32_t x, ports::ImageU8& sheet) {
+  const auto picture = [&](const Pair& pair) -> const Picture& {
+    return side == 0 ? pair.truth : pair.prediction;
+  };
+  const float aspect = float(rows.tile_width) / float(options.person_height_px);
+  paste(picture(column.body), framed(column.body.person, aspect, kPersonMargin), sheet, x, kGap_px,
+        rows.tile_width, options.person_height_px);
+  uint32_t y = options.person_height_px + 2 * kGap_px;
+  if (rows.busts) {
+    if (column.bust && !column.bust->face.empty()) {
+      paste(picture(*column.bust), framed(column.bust->face, 1, kBustMargin), sheet, x, y,
+            rows.tile_width, rows.tile_width);
+    }
+    y += rows.tile_width + kGap_px;
+  }
+  for (const Box& detail : {column.body.face, column.body.hand}) {
+    const float detail_aspect = float(rows.detail_width) / float(options.detail_height_px);
+    if (!detail.empty()) {
+      paste(picture(column.body), framed(detail, detail_aspect, kDetailMargin), sheet,
+            x + (rows.tile_width - rows.detail_width) / 2, y, rows.detail_width,
+            options.detail_height_px);
+    }
+    y += options.detail_height_px + kGap_px;
+  }
+}
+
 }  // namespace
 
 ports::ImageU8 make_contact_sheet(train::TrainedAvatar& avatar,
                                   const ContactSheetOptions& options) {
-  const dataset::Dataset& data = avatar.data();
-  struct Pair {
-    Picture truth, prediction;
-    Box person, face, hand;
-  };
-  std::vector<Pair> pairs;
+  std::vector<Column> columns;
   float aspect = 0.3f;  // width over height of the widest person
+  bool busts = false;
   for (const auto& [frame, camera] : choose_pictures(avatar, options.pairs)) {
-    const Camera& view = data.cameras()[camera].camera;
     const PosedFrame posed = pose_frame(avatar, frame);
-    Pair pair{.truth = true_picture(data, frame, camera),
-              .prediction = render_picture(avatar, posed, view),
-              .person = {},
-              .face = {},
-              .hand = {}};
-    pair.person = bounding_box(pair.truth);
-    if (pair.person.empty()) pair.person = {0, 0, int(view.width_px), int(view.height_px)};
-    pair.face = projected_box(avatar.model(), posed.posed, view, head_joints(), 0);
-    pair.hand = projected_box(avatar.model(), posed.posed, view, left_hand_joints(), 0);
-    aspect = std::max(
-        aspect, float(pair.person.x1 - pair.person.x0) / float(pair.person.y1 - pair.person.y0));
-    pairs.push_back(std::move(pair));
+    Column column{make_pair(avatar, posed, frame, camera), {}};
+    if (const std::optional<size_t> near = bust_camera(avatar, frame))
+      column.bust = make_pair(avatar, posed, frame, *near);
+    busts = busts || column.bust.has_value();
+    const Box& person = column.body.person;
+    aspect = std::max(aspect, float(person.x1 - person.x0) / float(person.y1 - person.y0));
+    columns.push_back(std::move(column));
   }
   const auto tile_width =
       static_cast<uint32_t>(std::ceil(aspect * float(options.person_height_px)));
-  const uint32_t detail_width = std::min(tile_width, options.detail_height_px);
+  const Rows rows{tile_width, std::min(tile_width, options.detail_height_px), busts};
   const uint32_t pair_width = 2 * tile_width + 2 * kGap_px;
-  ports::ImageU8 sheet(pair_width * uint32_t(pairs.size()) + kGap_px,
-                       options.person_height_px + 2 * options.detail_height_px + 4 * kGap_px, 3);
+  const uint32_t height = options.person_height_px + 2 * options.detail_height_px + 4 * kGap_px +
+                          (busts ? tile_width + kGap_px : 0);
+  ports::ImageU8 sheet(pair_width * uint32_t(columns.size()) + kGap_px, height, 3);
   std::fill(sheet.pixels.begin(), sheet.pixels.end(), uint8_t{255});
-  for (size_t i = 0; i < pairs.size(); ++i) {
-    const Pair& pair = pairs[i];
+  for (uint32_t i = 0; i < columns.size(); ++i) {
     for (int side = 0; side < 2; ++side) {
-      const Picture& picture = side == 0 ? pair.truth : pair.prediction;
-      const uint32_t x = kGap_px + uint32_t(i) * pair_width + side * (tile_width + kGap_px / 2);
-      const float person_aspect = float(tile_width) / float(options.person_height_px);
-      paste(picture, framed(pair.person, person_aspect, kPersonMargin), sheet, x, kGap_px,
-            tile_width, options.person_height_px);
-      const uint32_t centred = x + (tile_width - detail_width) / 2;
-      uint32_t y = options.person_height_px + 2 * kGap_px;
-      for (const Box& detail : {pair.face, pair.hand}) {
-        const float detail_aspect = float(detail_width) / float(options.detail_height_px);
-        if (!detail.empty())
-          paste(picture, framed(detail, detail_aspect, kDetailMargin), sheet, centred, y,
-                detail_width, options.detail_height_px);
-        y += options.detail_height_px + kGap_px;
-      }
+      const uint32_t x =
+          kGap_px + i * pair_width + static_cast<uint32_t>(side) * (tile_width + kGap_px / 2);
+      paste_column(columns[i], side, options, rows, x, sheet);
     }
   }
   return sheet;

@@ -2,8 +2,10 @@
 // pair.
 //
 //   row 1  held-out poses from held-out cameras, whole person
-//   row 2  the same pictures' faces
-//   row 3  the same pictures' left hands
+//   row 2  the same poses' head and shoulders, from the camera near by that sees most of the face;
+//          left out where the capture has no such cameras
+//   row 3  the pictures of row 1: faces
+//   row 4  the same pictures' left hands
 // Tiles are cut from the picture over mid-grey and scaled to one height (bilinear), never
 // sharpened.
 #pragma once

@@ -133,9 +133,10 @@ train::TrainSettings read_training(const JsonField& json, const std::string& pre
 }
 
 void read_capture(const JsonField& json, Recipe& recipe) {
-  allow_only(json, {"frames", "views", "size_px"});
+  allow_only(json, {"frames", "views", "bust_views", "size_px"});
   recipe.frames = count(json["frames"], 4, 100000);
   recipe.cameras.views = count(json["views"], 2, 256);
+  if (json.has("bust_views")) recipe.cameras.bust_views = count(json["bust_views"], 0, 256);
   recipe.cameras.width_px = recipe.cameras.height_px = count(json["size_px"], 16, 8192);
 }
 

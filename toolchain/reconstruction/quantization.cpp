@@ -128,6 +128,7 @@ void Laboratory::choose_pictures(const QuantizationOptions& options) {
   const dataset::Dataset& data = avatar_.data();
   std::vector<size_t> cameras, held_out_cameras, held_out_frames, training_frames;
   for (size_t camera = 0; camera < data.cameras().size(); ++camera) {
+    if (data.cameras()[camera].framing != dataset::Framing::kBody) continue;
     cameras.push_back(camera);
     if (data.cameras()[camera].held_out) held_out_cameras.push_back(camera);
   }

@@ -15,8 +15,10 @@ namespace figurine::reconstruction {
 
 using measure::Box;
 using measure::compare_outlines;
+using measure::count_filled;
 using measure::crop_error;
 using measure::difference_error;
+using measure::Filled;
 using measure::FlatColour;
 using measure::foreground_error;
 using measure::high_pass;
@@ -33,13 +35,15 @@ using pictures::true_picture;
 
 namespace {
 
-constexpr float kHeadEnlarge =
-    0.15f;  // hair and beard stand out from the skin that the box is drawn around
+// The wardrobe's hair rises by up to 14 % of the head's height over the skin that the box is drawn
+// around; wider, it would take in collars (docs/numerics.md, "Picture quality").
+constexpr float kHeadEnlarge = 0.15f;
 
 struct Group {
   SquaredError foreground, crop, head;
   HighPass sharpness, head_sharpness;
   Outline outline;
+  Filled filled;
   FlatColour flat;
   uint64_t images = 0;
 
@@ -52,6 +56,7 @@ struct Group {
       head_sharpness.add(high_pass(prediction, truth, head_box));
     }
     outline.add(compare_outlines(prediction, truth));
+    filled.add(count_filled(prediction, truth));
     flat.add(truth);
     ++images;
   }
@@ -65,9 +70,28 @@ nlohmann::json to_json(const Group& group) {
           {"crop_psnr_db", finite(group.crop.psnr_db())},
           {"head_psnr_db", finite(group.head.psnr_db())},
           {"highpass_ratio", finite(group.sharpness.ratio())},
+          {"highpass_correlation", finite(group.sharpness.correlation())},
           {"head_highpass_ratio", finite(group.head_sharpness.ratio())},
+          {"head_highpass_correlation", finite(group.head_sharpness.correlation())},
+          {"filled_share", finite(group.filled.share())},
           {"mask_iou", group.outline.iou()},
           {"uncovered_share", group.outline.uncovered_share()}};
+}
+
+// Images of the same role, told apart by how much of the person they hold.
+struct Framed {
+  Group body, bust;
+  Group& of(dataset::Framing framing) { return framing == dataset::Framing::kBust ? bust : body; }
+};
+
+// The same figures of close-ups have "bust_" before their names; none where there are no such
+// images.
+nlohmann::json to_json(const Framed& framed) {
+  nlohmann::json report = to_json(framed.body);
+  if (framed.bust.images == 0) return report;
+  const nlohmann::json bust = to_json(framed.bust);
+  for (const auto& [name, value] : bust.items()) report["bust_" + name] = value;
+  return report;
 }
 
 // The groups that an image of this role counts for.
@@ -93,7 +117,7 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
                                        const ReconstructionOptions& options) {
   const dataset::Dataset& data = avatar.data();
   const size_t cameras = data.cameras().size(), frames = data.frames().size();
-  std::map<std::string, Group> groups;
+  std::map<std::string, Framed> groups;
   SquaredError difference;
   // Per camera the picture of the block frame before, for the frame differences.
   struct Before {
@@ -115,12 +139,14 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
       if (interrupt.requested()) throw train::Interrupted("evaluate: stopped; nothing was written");
       if (!posed) posed = pose_frame(avatar, frame);
       const Camera& view = data.cameras()[camera].camera;
+      const dataset::Framing framing = data.cameras()[camera].framing;
       const Picture prediction = render_picture(avatar, *posed, view);
       const Picture truth = true_picture(data, frame, camera);
       const Box head_box =
           projected_box(avatar.model(), posed->posed, view, head_joints(), kHeadEnlarge);
-      for (const std::string& name : groups_of(role)) groups[name].add(prediction, truth, head_box);
-      if (split == dataset::FrameSplit::kBlock) {
+      for (const std::string& group : groups_of(role))
+        groups[group].of(framing).add(prediction, truth, head_box);
+      if (split == dataset::FrameSplit::kBlock && framing == dataset::Framing::kBody) {
         std::optional<Before>& last = before[camera];
         if (last && last->frame + 1 == frame)
           difference.add(difference_error(last->prediction, prediction, last->truth, truth));
@@ -144,9 +170,12 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
       "MSE; flat: one colour with a perfect "
       "mask; crop: bounding box "
       "of the mask, over black; head: projected box of the head's texels, 15 % larger; high-pass: "
-      "energy of (picture - 3x3 binomial) "
+      "energy of (picture - 3x3 mean) "
       "inside the mask, "
-      "prediction over truth; difference: PSNR of consecutive frames' differences in the held-out "
+      "prediction over truth, and its correlation with the truth's; filled: alpha of at least 0.98 "
+      "where the truth has it, 3 pixels inside the mask; bust: the same of the cameras of head and "
+      "shoulders, which count nowhere else; difference: PSNR of consecutive frames' differences in "
+      "the held-out "
       "block";
   return report;
 }

@@ -16,10 +16,11 @@ struct ReconstructionOptions {
   uint32_t view_frame_step = 1;
 };
 
-// A report (docs/evaluation.md): the groups "held_out_views", "held_out_poses" (with "interleaved"
-// and "block" apart) and "held_out_views_and_poses", each with psnr_db, flat_psnr_db, crop_psnr_db,
-// head_psnr_db, highpass_ratio, head_highpass_ratio, mask_iou, uncovered_share, images;
-// difference_psnr_db of the block, and the sizes of the avatar's parts.
+// A report (docs/json.md, "evaluate reconstruction"): the groups "held_out_views",
+// "held_out_poses" (with "interleaved" and "block" apart) and "held_out_views_and_poses", each with
+// the figures of Group over the cameras of whole bodies, and the same with "bust_" before their
+// names over those of head and shoulders, where there are any; difference_psnr_db of the block, and
+// the sizes of the avatar's parts.
 nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
                                        const ReconstructionOptions& options);
 

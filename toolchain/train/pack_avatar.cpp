@@ -9,6 +9,7 @@
 #include "toolchain/error.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
+#include "toolchain/train/facing.h"
 
 namespace figurine::train {
 
@@ -88,6 +89,11 @@ std::vector<QualityMetric> read_quality(const RunDirectory& run) {
   add("flat_psnr_db", "held_out_poses", "flat_psnr_db");
   add("head_psnr_db", "held_out_poses", "head_psnr_db");
   add("highpass_ratio", "held_out_poses", "highpass_ratio");
+  add("highpass_correlation", "held_out_poses", "highpass_correlation");
+  add("filled_share", "held_out_poses", "filled_share");
+  for (const char* metric :
+       {"bust_psnr_db", "bust_head_psnr_db", "bust_highpass_ratio", "bust_highpass_correlation"})
+    add(metric, "held_out_poses", metric);
   return quality;
 }
 
@@ -185,8 +191,18 @@ GoldenView choose_golden_view(const TrainedAvatar& avatar) {
   for (size_t frame = 0; frame < data.frames().size(); ++frame) {
     if (data.frames()[frame].split == dataset::FrameSplit::kBlock) block.push_back(frame);
   }
-  const size_t frame = block.empty() ? data.frames().size() / 2 : block[block.size() / 2];
-  GoldenView view{avatar.model().from_capture(data.frames()[frame]), data.cameras().front().camera};
+  if (block.empty()) block.push_back(data.frames().size() / 2);
+  size_t best_frame = block.front(), best_camera = 0;
+  float most = -2;
+  for (const size_t frame : block) {
+    for (size_t c = 0; c < data.cameras().size(); ++c) {
+      if (data.cameras()[c].framing != dataset::Framing::kBody) continue;
+      const float faced = facing(avatar.body(), data.frames()[frame], data.cameras()[c].camera);
+      if (faced > most) most = faced, best_frame = frame, best_camera = c;
+    }
+  }
+  GoldenView view{avatar.model().from_capture(data.frames()[best_frame]),
+                  data.cameras()[best_camera].camera};
   Camera& camera = view.camera;
   const float shrink =
       std::min(1.0f, float(kGoldenSize_px) / float(std::max(camera.width_px, camera.height_px)));

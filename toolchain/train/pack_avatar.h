@@ -28,8 +28,9 @@ struct PackOptions {
   std::vector<std::string> authors;
 };
 
-// The pose and the camera of the golden frame: the middle of the held-out block (of the training
-// poses if nothing is held out), seen by the first camera at 256 pixels or less a side.
+// The pose and the camera of the golden frame: of the poses of the held-out block (the middle one
+// of all if nothing is held out) and the cameras of whole bodies, those two that face each other
+// most nearly, so that whoever opens a package sees a face; at 256 pixels or less a side.
 struct GoldenView {
   OwnedPose pose;
   Camera camera;

@@ -44,6 +44,11 @@ struct Body {
   std::span<const uint32_t>
       border_source;  // [D] row in [0,N) whose map value the border texel repeats
 
+  // Where the texels lie on the mesh that the body was made from, which the package does not hold:
+  // for whoever has that mesh. Empty where the map is the mesh's own UV layout, which says as much.
+  std::span<const uint32_t> texel_triangle;  // [N] in the mesh's order
+  std::span<const float> texel_barycentric;  // [N,3] weights of its corners, sum 1 within 1e-4
+
   uint32_t joint_count() const { return static_cast<uint32_t>(parents.size()); }
   uint32_t texel_count() const { return static_cast<uint32_t>(texel.size()); }
   uint32_t shape_count() const {

@@ -50,6 +50,24 @@ Status check_texels(const Body& body) {
   return {};
 }
 
+Status check_mesh_places(const Body& body) {
+  if (body.texel_triangle.empty() != body.texel_barycentric.empty()) {
+    return corrupt("body.texel_triangle",
+                   "and body.texel_barycentric: one is there without the other");
+  }
+  for (size_t i = 0; i < body.texel_triangle.size(); ++i) {
+    double sum = 0;
+    for (size_t k = 3 * i; k < 3 * i + 3; ++k) {
+      if (!(body.texel_barycentric[k] >= -1e-4f && body.texel_barycentric[k] <= 1.0001f))
+        return corrupt("body.texel_barycentric", "texel ", i, ": is not inside its triangle");
+      sum += body.texel_barycentric[k];
+    }
+    if (!(std::fabs(sum - 1) <= 1e-4))
+      return corrupt("body.texel_barycentric", "texel ", i, ": sums to ", sum, ", not 1");
+  }
+  return {};
+}
+
 Status check_border(const Body& body) {
   const size_t texels = size_t(body.uv_size) * body.uv_size;
   std::vector<bool> taken(texels, false);
@@ -98,6 +116,10 @@ Status read_body(const schema::Index& index, BlobReader& blobs, Body& out) {
                                  out.texel_shape_basis_m, kMayBeAbsent));
   FIG_RETURN_IF_ERROR(blobs.read("body.border_texel", {kAny}, out.border_texel, kMayBeAbsent));
   FIG_RETURN_IF_ERROR(blobs.read("body.border_source", {kAny}, out.border_source, kMayBeAbsent));
+  FIG_RETURN_IF_ERROR(
+      blobs.read("body.texel_triangle", {texels}, out.texel_triangle, kMayBeAbsent));
+  FIG_RETURN_IF_ERROR(
+      blobs.read("body.texel_barycentric", {texels, 3}, out.texel_barycentric, kMayBeAbsent));
 
   const uint32_t shapes = out.shape_count();
   if (shapes > kMaxShapeCoefficients) {
@@ -121,6 +143,7 @@ Status read_body(const schema::Index& index, BlobReader& blobs, Body& out) {
   FIG_RETURN_IF_ERROR(
       check_magnitude(out.texel_shape_basis_m, "body.texel_shape_basis", layout::kMaxLengthM));
   FIG_RETURN_IF_ERROR(check_texels(out));
+  FIG_RETURN_IF_ERROR(check_mesh_places(out));
   return check_border(out);
 }
 

@@ -56,6 +56,18 @@ struct LeaveOut {
   bool outside = true;        // Gaussians that touch no pixel of the image
   bool missed_tiles = true;   // tiles of a Gaussian's box that its ellipse does not reach
   bool stopped = true;        // the rest of a tile's Gaussians once all of its pixels have stopped
+  bool unchanged_networks = true;  // runs of networks whose last run was for the same pose, to the
+                                   // bit: their outputs are still there
+};
+
+// What a frame may leave out although it shows: off unless asked for. FrameStatistics counts.
+struct Approximation {
+  // Avatars whose box in the image has both sides below this many pixels keep what their network
+  // said of the pose that it ran for last, however long ago; skeleton, skinning and everything
+  // behind follow the pose as always. The picture then depends on the frames before it. Each avatar
+  // is for itself, but of several that are held once (Renderer::add_avatar) only that one profits
+  // for which the network ran last. 0: every pose has its run.
+  float network_below_px = 0;
 };
 
 struct FrameAvatar {
@@ -71,6 +83,7 @@ struct Frame {
       background;  // opaque colour behind; without it the image keeps its alpha
   SplatOptions splat;
   LeaveOut leave_out;
+  Approximation approximation;
 };
 
 enum class Stage : uint8_t {
@@ -94,11 +107,14 @@ struct FrameStatistics {
   uint64_t pairs = 0;                            // (Gaussian, tile)
   uint64_t blends = 0;                           // contributions blended into pixels
   uint64_t macs = 0;
+  uint64_t networks = 0;        // runs
+  uint64_t stale_networks = 0;  // runs that Approximation::network_below_px saved
   struct LeftOut {
     uint64_t hidden_texels = 0;
     uint64_t transparent = 0, outside = 0;  // Gaussians
     uint64_t missed_tiles = 0;              // (Gaussian, tile) pairs of boxes
     uint64_t stopped = 0;                   // (Gaussian, tile) pairs behind stopped tiles
+    uint64_t unchanged_networks = 0;        // runs
   } left_out;
 };
 

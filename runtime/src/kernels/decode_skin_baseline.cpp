@@ -1,9 +1,11 @@
 // A network's head to world-space Gaussians: the specification of every other kernel. A loop over
 // the lanes a step, without branches, so that compilers make vector code of each.
 //
-// Canonical first: position = texel + offset, factor = R S. Then the world: the centre by the
-// blended transform, the factor by its linear part A itself (no rotation is extracted from it).
-// Based on: docs/numerics.md, "From the head to a Gaussian"; Loper et al., SMPL, 2015 (skinning).
+// A coarser network's heads come together first, lane by lane, because a head's values lie side by
+// side; then the static part, in planes. Canonical first: position = texel + offset, factor = R S.
+// Then the world: the centre by the blended transform, the factor by its linear part A itself (no
+// rotation is extracted from it). Based on: docs/numerics.md, "From the head to a Gaussian"; Loper
+// et al., SMPL, 2015 (skinning).
 #include "runtime/src/kernels/kernel.h"
 
 namespace figurine::kernels {
@@ -11,20 +13,61 @@ namespace {
 
 #include "runtime/src/kernels/kernel_math.inc"
 
-constexpr uint32_t kShapeValues = 11;  // of a head: offset 3, log-scale 3, quaternion 4, opacity
-
 using Plane = float[kLanes];
+using Head = float[kShapeValues + kMaxShValues];
 
 float clamp(float value, float low, float high) {
   return value < low ? low : (value > high ? high : value);
 }
 
-void load_heads(const DecodeSkinJob& job, Plane* __restrict head, Plane* __restrict sh) {
+// The heads of texels between a coarser network's.
+void blend_heads(const DecodeSkinJob& job, Head* __restrict blended) {
+  const uint32_t values = kShapeValues + job.sh_values;
   for (uint32_t lane = 0; lane < kLanes; ++lane) {
-    const float* h = job.head[lane];
-    for (uint32_t k = 0; k < kShapeValues; ++k) head[k][lane] = h[k];
-    for (uint32_t k = 0; k < job.sh_values; ++k) sh[k][lane] = h[kShapeValues + k];
+    const float *y0 = job.head[0][lane], *y1 = job.head[1][lane], *y2 = job.head[2][lane],
+                *y3 = job.head[3][lane];
+    const float w0 = job.taps->weight[0][lane], w1 = job.taps->weight[1][lane],
+                w2 = job.taps->weight[2][lane], w3 = job.taps->weight[3][lane];
+    float* __restrict out = blended[lane];
+    for (uint32_t k = 0; k < values; ++k)
+      out[k] = (w0 * y0[k] + w1 * y1[k]) + (w2 * y2[k] + w3 * y3[k]);
   }
+}
+
+void load_heads(const float* const* heads, uint32_t sh_values, Plane* __restrict head,
+                Plane* __restrict sh) {
+  for (uint32_t lane = 0; lane < kLanes; ++lane) {
+    const float* h = heads[lane];
+    for (uint32_t k = 0; k < kShapeValues; ++k) head[k][lane] = h[k];
+    for (uint32_t k = 0; k < sh_values; ++k) sh[k][lane] = h[kShapeValues + k];
+  }
+}
+
+void add_static(const StaticBlock& __restrict texels, uint32_t sh_values, Plane* __restrict head,
+                Plane* __restrict sh) {
+  for (uint32_t k = 0; k < kShapeValues; ++k) {
+    for (uint32_t lane = 0; lane < kLanes; ++lane) head[k][lane] += texels.sum[k][lane];
+  }
+  for (uint32_t c = 0; c < 3; ++c) {
+    for (uint32_t lane = 0; lane < kLanes; ++lane)
+      sh[c][lane] = (sh[c][lane] + kHalfColour) * texels.gain[c][lane] - kHalfColour;
+  }
+  for (uint32_t k = 3; k < sh_values; ++k) {
+    for (uint32_t lane = 0; lane < kLanes; ++lane) sh[k][lane] *= texels.gain[k % 3][lane];
+  }
+}
+
+void compose_heads(const DecodeSkinJob& job, Plane* __restrict head, Plane* __restrict sh) {
+  if (job.taps == nullptr) {
+    load_heads(job.head[0], job.sh_values, head, sh);
+  } else {
+    Head blended[kLanes];
+    blend_heads(job, blended);
+    const float* heads[kLanes];
+    for (uint32_t lane = 0; lane < kLanes; ++lane) heads[lane] = blended[lane];
+    load_heads(heads, job.sh_values, head, sh);
+  }
+  if (job.static_part != nullptr) add_static(*job.static_part, job.sh_values, head, sh);
 }
 
 // Unit quaternions' rotation matrices, row-major; zero or not finite quaternions give the identity.
@@ -92,7 +135,7 @@ void skin_factors(const TransformBlock& __restrict transforms, const Plane* __re
 void decode_skin_baseline(const DecodeSkinJob& job) {
   GaussianBlock& out = *job.gaussians;
   alignas(64) Plane head[kShapeValues], scale[3], rotation[9];
-  load_heads(job, head, out.sh);
+  compose_heads(job, head, out.sh);
   for (int k = 0; k < 3; ++k) {
     for (uint32_t lane = 0; lane < kLanes; ++lane) {
       const float offset =

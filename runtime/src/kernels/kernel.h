@@ -19,6 +19,8 @@ constexpr uint32_t kLanes = 16;
 constexpr uint32_t kInfluences = 8;    // joints of a texel
 constexpr uint32_t kMapPlanes = 6;     // position 3, normal 3
 constexpr uint32_t kMaxShValues = 48;  // (3 + 1)^2 coefficients of red, green and blue
+constexpr uint32_t kShapeValues = 11;  // of a head: offset 3, log-scale 3, quaternion 4, opacity
+constexpr uint32_t kTaps = 4;          // heads of a coarser network around a texel
 
 constexpr int32_t kTileSize = 32;  // pixels a side
 constexpr int32_t kTilePixels = kTileSize * kTileSize;
@@ -28,6 +30,7 @@ constexpr float kDilationPx2 = 0.3f;
 constexpr float kAlphaMax = 0.99f;
 constexpr float kTransmittanceStop = 1e-4f;
 constexpr float kShOffset = 0.5f;
+constexpr float kHalfColour = 1.7724538509f;  // of a static part (figurine/avatar.h)
 
 // What a body says of a block of its texels. Lanes behind a body's last texel repeat it.
 struct alignas(64) TexelBlock {
@@ -49,6 +52,19 @@ struct alignas(64) TransformBlock {
   float linear[9][kLanes];  // row-major [3,3]
   float mean_translation_m[3][kLanes];
   float own_translation_m[3][kLanes];
+};
+
+// Which heads of a coarser network a block's texels lie between, and their weights: a texel's head
+// is (w0 y0 + w1 y1) + (w2 y2 + w3 y3) (figurine/texel_grid.h).
+struct alignas(64) TapBlock {
+  uint32_t row[kTaps][kLanes];  // of covered cells
+  float weight[kTaps][kLanes];
+};
+
+// What the pose does not change of a block's Gaussians (figurine/avatar.h, StaticPart).
+struct alignas(64) StaticBlock {
+  float sum[kShapeValues][kLanes];  // s, added
+  float gain[3][kLanes];            // e^s of red, green and blue
 };
 
 // World-space Gaussians, as figurine::GaussianView has them.
@@ -78,10 +94,14 @@ struct PoseMapsJob {
 };
 using PoseMaps = void(const PoseMapsJob& job);
 
-// A network's head to Gaussians in the world (figurine/avatar.h, HeadDecoding).
+// A network's heads and the static part to Gaussians in the world (figurine/avatar.h, StaticPart
+// and HeadDecoding).
 struct DecodeSkinJob {
-  const float*
-      head[kLanes];  // each lane's outputs: offset 3, log-scale 3, quaternion 4, opacity, SH
+  // Outputs: offset 3, log-scale 3, quaternion 4, opacity, SH. A lane's are head[0][lane], without
+  // arithmetic; or, with taps, those of the four heads weighted.
+  const float* head[kTaps][kLanes];
+  const TapBlock* taps;            // null: the first row of heads is all there is
+  const StaticBlock* static_part;  // null: none
   const CanonicalBlock* texels;
   const TransformBlock* transforms;
   float offset_scale_m, max_offset, max_log_scale, opacity_bias;  // an infinite bound is none

@@ -4,7 +4,7 @@
 #include <array>
 #include <string>
 
-#include "figurine/body.h"
+#include "figurine/avatar.h"
 #include "figurine/gaussian.h"
 
 namespace figurine {
@@ -14,6 +14,8 @@ static_assert(kernels::kInfluences == kSkinInfluences && kernels::kMapPlanes == 
 static_assert(kernels::kMaxShValues == 3 * sh_coefficients(kMaxShDegree));
 static_assert(kernels::kDilationPx2 == kDilationPx2 && kernels::kAlphaMax == kAlphaMax &&
               kernels::kTransmittanceStop == kTransmittanceStop && kernels::kShOffset == kShOffset);
+static_assert(kernels::kShapeValues == kStaticColour &&
+              kernels::kShapeValues + 3 == kStaticChannels && kernels::kHalfColour == kHalfColour);
 
 namespace kernels {
 #define FIG_KERNEL(Type, operation, isa) Type operation##_##isa;

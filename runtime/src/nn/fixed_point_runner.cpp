@@ -282,9 +282,13 @@ Status FixedPointRunner::run(std::span<const uint32_t> groups) {
   }
   if (runtime_ != nullptr)
     FIG_RETURN_IF_ERROR(xnnpack_status(xnn_invoke_runtime(runtime_.get()), "running the network"));
+  run_further(groups);
+  return {};
+}
+
+void FixedPointRunner::run_further(std::span<const uint32_t> groups) {
   pool_.for_each((groups.size() + kGroupsPerTask - 1) / kGroupsPerTask,
                  [&](size_t task) { run_head(groups, task); });
-  return {};
 }
 
 uint64_t FixedPointRunner::memory_bytes() const {

@@ -58,6 +58,8 @@ class FixedPointRunner {
   static constexpr uint32_t kWantedGroup = 16;
   Status run();
   Status run(std::span<const uint32_t> groups);
+  // Further groups of the last run: its input's, whatever the input holds by now.
+  void run_further(std::span<const uint32_t> groups);
 
   uint64_t macs() const { return macs_; }
   uint64_t memory_bytes() const;  // XNNPACK's share is estimated

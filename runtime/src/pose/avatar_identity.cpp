@@ -56,6 +56,16 @@ void add_fixed_point(const FixedPointNetwork& fixed, Words& words) {
   }
 }
 
+void add_static_part(const StaticPart& part, Words& words) {
+  words.add(uint64_t{part.groups.size()});
+  for (const StaticGroup& group : part.groups) {
+    for (const uint32_t word : {group.first_channel, group.channels, group.grid_size})
+      words.add(uint64_t{word});
+    words.add(group.values);
+    words.add(group.scale);
+  }
+}
+
 }  // namespace
 
 AvatarIdentity identify(const Avatar& avatar, const Body& body, Precision precision) {
@@ -74,6 +84,7 @@ AvatarIdentity identify(const Avatar& avatar, const Body& body, Precision precis
   words.add(uint64_t{decoding.sh_degree});
   add_layers(avatar.network, precision == Precision::kFloat32, words);
   if (precision == Precision::kFixedPoint) add_fixed_point(avatar.fixed_point, words);
+  add_static_part(avatar.static_part, words);
   return words.hash();
 }
 

@@ -1,5 +1,6 @@
 #include "runtime/src/pose/avatar_network.h"
 
+#include <algorithm>
 #include <new>
 #include <string>
 #include <utility>
@@ -16,11 +17,12 @@ static_assert(FixedPointRunner::kWantedGroup == kernels::kLanes);
 
 Status corrupt(const std::string& what) { return Status(StatusCode::kCorrupt, "avatar: " + what); }
 
-Status check_fits(const Avatar& avatar, const Body& body, const std::vector<ValueShape>& shapes) {
-  if (shapes.front().size != body.uv_size || shapes.back().size != body.uv_size) {
+Status check_fits(const Avatar& avatar, const BodyGrid& grid,
+                  const std::vector<ValueShape>& shapes) {
+  if (shapes.front().size != grid.size() || shapes.back().size != grid.size()) {
     return corrupt("the network maps " + std::to_string(shapes.front().size) +
-                   " texels a side to " + std::to_string(shapes.back().size) + ", the body has " +
-                   std::to_string(body.uv_size));
+                   " texels a side to " + std::to_string(shapes.back().size) +
+                   ", its grid over the body has " + std::to_string(grid.size()));
   }
   if (avatar.fourier_octaves > 16 ||
       shapes.front().channels != kMapChannels + 4 * avatar.fourier_octaves) {
@@ -46,101 +48,134 @@ Status check_holds(const Avatar& avatar, Precision precision) {
                                               "` makes a package that has it");
 }
 
-// Dense: XNNPACK evaluates every texel.
+// Dense: XNNPACK evaluates every cell.
 class FloatAvatarNetwork : public AvatarNetwork {
  public:
-  static Result<std::unique_ptr<AvatarNetwork>> create(const Avatar& avatar, const Body& body,
+  static Result<std::unique_ptr<AvatarNetwork>> create(const Avatar& avatar, const BodyGrid& grid,
                                                        uint32_t input_channels, ThreadPool& pool) {
     Result<std::unique_ptr<NetworkRunner>> runner = NetworkRunner::create(avatar.network, pool);
     if (!runner.ok()) return runner.status();
-    draw_fourier_channels(body.uv_size, avatar.fourier_octaves, kMapChannels, input_channels,
+    draw_fourier_channels(grid.size(), avatar.fourier_octaves, kMapChannels, input_channels,
                           (*runner)->input());
-    std::unique_ptr<AvatarNetwork> network(
-        new (std::nothrow) FloatAvatarNetwork(std::move(runner).value(), body.texel, input_channels,
-                                              head_channels(avatar.decoding.sh_degree)));
+    std::unique_ptr<AvatarNetwork> network(new (std::nothrow) FloatAvatarNetwork(
+        std::move(runner).value(), grid, input_channels, head_channels(avatar.decoding.sh_degree)));
     if (network == nullptr) return out_of_memory("an avatar's network");
     return network;
   }
 
   MapTarget input() override { return {runner_->input().data(), input_channels_}; }
   Status run(std::span<const uint32_t>) override { return runner_->run(); }
-  const float* head(size_t i) const override {
-    return &std::as_const(*runner_).output()[size_t{texel_[i]} * head_channels_];
+  void run_further(std::span<const uint32_t>) override {}
+  void find_heads(const uint32_t (&rows)[kernels::kLanes],
+                  const float* (&heads)[kernels::kLanes]) const override {
+    const float* const output = std::as_const(*runner_).output().data();
+    const std::span<const uint32_t> cell = grid_.cell();
+    for (uint32_t lane = 0; lane < kernels::kLanes; ++lane)
+      heads[lane] = output + size_t{cell[rows[lane]]} * head_channels_;
   }
-  Precision precision() const override { return Precision::kFloat32; }
   uint64_t macs() const override { return runner_->macs(); }
   uint64_t memory_bytes() const override { return runner_->memory_bytes(); }
 
  private:
-  FloatAvatarNetwork(std::unique_ptr<NetworkRunner> runner, std::span<const uint32_t> texel,
+  FloatAvatarNetwork(std::unique_ptr<NetworkRunner> runner, const BodyGrid& grid,
                      uint32_t input_channels, uint32_t head_channels)
       : runner_(std::move(runner)),
-        texel_(texel),
+        grid_(grid),
         input_channels_(input_channels),
         head_channels_(head_channels) {}
 
   std::unique_ptr<NetworkRunner> runner_;
-  std::span<const uint32_t> texel_;
+  const BodyGrid& grid_;
   uint32_t input_channels_, head_channels_;
 };
 
 // The Fourier channels are constants to the runner, and its head is evaluated where it is wanted.
 class FixedPointAvatarNetwork : public AvatarNetwork {
  public:
-  static Result<std::unique_ptr<AvatarNetwork>> create(const Avatar& avatar, const Body& body,
+  static Result<std::unique_ptr<AvatarNetwork>> create(const Avatar& avatar, const BodyGrid& grid,
                                                        ThreadPool& pool,
                                                        const KernelTable& kernels) {
     const uint32_t fourier_channels = 4 * avatar.fourier_octaves;
-    std::vector<float> fourier(size_t{body.uv_size} * body.uv_size * fourier_channels);
-    draw_fourier_channels(body.uv_size, avatar.fourier_octaves, 0, fourier_channels, fourier);
-    std::vector<uint32_t> drawn(body.texel.begin(), body.texel.end());
-    drawn.insert(drawn.end(), body.border_texel.begin(), body.border_texel.end());
+    std::vector<float> fourier(size_t{grid.size()} * grid.size() * fourier_channels);
+    draw_fourier_channels(grid.size(), avatar.fourier_octaves, 0, fourier_channels, fourier);
+    std::vector<uint32_t> drawn(grid.cell().begin(), grid.cell().end());
+    drawn.insert(drawn.end(), grid.border_cell().begin(), grid.border_cell().end());
     Result<std::unique_ptr<FixedPointRunner>> runner =
         FixedPointRunner::create(avatar.network, avatar.fixed_point,
                                  {.varying_channels = kMapChannels,
                                   .constants = fourier,
                                   .drawn = drawn,
-                                  .wanted = body.texel},
+                                  .wanted = grid.cell()},
                                  pool, kernels);
     if (!runner.ok()) return runner.status();
-    std::unique_ptr<AvatarNetwork> network(new (std::nothrow) FixedPointAvatarNetwork(
-        std::move(runner).value(), head_channels(avatar.decoding.sh_degree)));
-    if (network == nullptr) return out_of_memory("an avatar's network");
-    return network;
+    std::unique_ptr<FixedPointAvatarNetwork> network(new (std::nothrow) FixedPointAvatarNetwork(
+        std::move(runner).value(), grid, head_channels(avatar.decoding.sh_degree)));
+    if (network == nullptr || !network->evaluated_.ensure(grid.cell_blocks()) ||
+        !network->groups_.ensure(grid.cell_blocks())) {
+      return out_of_memory("an avatar's network");
+    }
+    return std::unique_ptr<AvatarNetwork>(std::move(network));
   }
 
   MapTarget input() override { return {runner_->input().data(), runner_->input_stride()}; }
   Status run(std::span<const uint32_t> wanted_blocks) override {
-    return runner_->run(wanted_blocks);
+    std::fill_n(evaluated_.data(), grid_.cell_blocks(), uint8_t{0});
+    return runner_->run(take_missing(wanted_blocks));
   }
-  const float* head(size_t i) const override {
-    return &std::as_const(*runner_).output()[i * head_channels_];
+  void run_further(std::span<const uint32_t> wanted_blocks) override {
+    runner_->run_further(take_missing(wanted_blocks));
   }
-  Precision precision() const override { return Precision::kFixedPoint; }
+  void find_heads(const uint32_t (&rows)[kernels::kLanes],
+                  const float* (&heads)[kernels::kLanes]) const override {
+    const float* const output = std::as_const(*runner_).output().data();
+    for (uint32_t lane = 0; lane < kernels::kLanes; ++lane)
+      heads[lane] = output + size_t{rows[lane]} * head_channels_;
+  }
   uint64_t macs() const override { return runner_->macs(); }
-  uint64_t memory_bytes() const override { return runner_->memory_bytes(); }
+  uint64_t memory_bytes() const override {
+    return runner_->memory_bytes() + evaluated_.memory_bytes() + groups_.memory_bytes();
+  }
 
  private:
-  FixedPointAvatarNetwork(std::unique_ptr<FixedPointRunner> runner, uint32_t head_channels)
-      : runner_(std::move(runner)), head_channels_(head_channels) {}
+  FixedPointAvatarNetwork(std::unique_ptr<FixedPointRunner> runner, const BodyGrid& grid,
+                          uint32_t head_channels)
+      : runner_(std::move(runner)), grid_(grid), head_channels_(head_channels) {}
+
+  // The groups of cells that the blocks of texels need and that are not evaluated yet; from here on
+  // they count as evaluated.
+  std::span<const uint32_t> take_missing(std::span<const uint32_t> wanted_blocks) {
+    size_t count = 0;
+    for (const uint32_t block : wanted_blocks) {
+      for (const uint32_t group : grid_.cell_blocks_of(block)) {
+        if (evaluated_[group] != 0) continue;
+        evaluated_[group] = 1;
+        groups_[count++] = group;
+      }
+    }
+    return groups_.span(count);
+  }
 
   std::unique_ptr<FixedPointRunner> runner_;
+  const BodyGrid& grid_;
   uint32_t head_channels_;
+  Buffer<uint8_t> evaluated_;  // [cell blocks] in the last run and since
+  Buffer<uint32_t> groups_;    // [cell blocks]
 };
 
 }  // namespace
 
-Result<std::unique_ptr<AvatarNetwork>> AvatarNetwork::create(const Avatar& avatar, const Body& body,
+Result<std::unique_ptr<AvatarNetwork>> AvatarNetwork::create(const Avatar& avatar,
+                                                             const BodyGrid& grid,
                                                              Precision precision, ThreadPool& pool,
                                                              const KernelTable& kernels) {
   FIG_RETURN_IF_ERROR(check_holds(avatar, precision));
   const Result<std::vector<ValueShape>> shapes = infer_shapes(avatar.network, false);
   if (!shapes.ok()) return shapes.status();
-  FIG_RETURN_IF_ERROR(check_fits(avatar, body, *shapes));
+  FIG_RETURN_IF_ERROR(check_fits(avatar, grid, *shapes));
   if (precision == Precision::kFixedPoint) {
-    return FixedPointAvatarNetwork::create(avatar, body, pool, kernels);
+    return FixedPointAvatarNetwork::create(avatar, grid, pool, kernels);
   }
-  return FloatAvatarNetwork::create(avatar, body, shapes->front().channels, pool);
+  return FloatAvatarNetwork::create(avatar, grid, shapes->front().channels, pool);
 }
 
 }  // namespace figurine

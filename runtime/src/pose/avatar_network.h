@@ -1,4 +1,4 @@
-// An avatar's network, whatever it computes in: maps in, heads of the wanted texels out.
+// An avatar's network, whatever it computes in: maps in, heads of the wanted cells out.
 #pragma once
 
 #include <cstdint>
@@ -6,9 +6,9 @@
 #include <span>
 
 #include "figurine/avatar.h"
-#include "figurine/body.h"
 #include "runtime/src/base/thread_pool.h"
 #include "runtime/src/kernels/table.h"
+#include "runtime/src/pose/body_grid.h"
 #include "runtime/src/pose/maps.h"
 
 namespace figurine {
@@ -16,22 +16,25 @@ namespace figurine {
 class AvatarNetwork {
  public:
   // Fourier channels are drawn here, once. The network's weights are read here and not afterwards;
-  // the body's arrays are borrowed. Errors: kUnsupported if the avatar does not hold the precision;
-  // kCorrupt if the network does not fit the maps or the head; those of the network's runner;
-  // kOutOfMemory.
-  static Result<std::unique_ptr<AvatarNetwork>> create(const Avatar& avatar, const Body& body,
+  // the grid, of the network's size, is borrowed. Errors: kUnsupported if the avatar does not hold
+  // the precision; kCorrupt if the network does not fit the maps or the head; those of the
+  // network's runner; kOutOfMemory.
+  static Result<std::unique_ptr<AvatarNetwork>> create(const Avatar& avatar, const BodyGrid& grid,
                                                        Precision precision, ThreadPool& pool,
                                                        const KernelTable& kernels);
   virtual ~AvatarNetwork() = default;
 
-  // Where a pose's maps are drawn; zero wherever no texel of the body ever is.
+  // Where a pose's maps are drawn; zero wherever no cell of the grid ever is.
   virtual MapTarget input() = 0;
-  // Evaluates at least the texels of the wanted blocks, which are ascending.
+  // Evaluates at least the cells that the wanted blocks of texels lie between.
   virtual Status run(std::span<const uint32_t> wanted_blocks) = 0;
-  // The outputs for covered texel i of a wanted block, [head_channels].
-  virtual const float* head(size_t i) const = 0;
+  // What run() of further blocks would have evaluated beside: the maps are still those of the last
+  // run.
+  virtual void run_further(std::span<const uint32_t> wanted_blocks) = 0;
+  // Where the outputs of covered cells are that have been evaluated, [head_channels] each.
+  virtual void find_heads(const uint32_t (&rows)[kernels::kLanes],
+                          const float* (&heads)[kernels::kLanes]) const = 0;
 
-  virtual Precision precision() const = 0;
   virtual uint64_t macs() const = 0;
   virtual uint64_t memory_bytes() const = 0;
 };

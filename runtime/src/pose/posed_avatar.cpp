@@ -1,8 +1,10 @@
 #include "runtime/src/pose/posed_avatar.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <new>
+#include <string>
 #include <utility>
 
 #include "runtime/src/pose/maps.h"
@@ -21,17 +23,39 @@ bool PoseScratch::ensure(uint32_t joints, uint32_t blocks) {
 
 Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, const Body& body,
                                                          const BodyBlocks& blocks,
+                                                         std::shared_ptr<const BodyGrid> grid,
                                                          Precision precision, ThreadPool& pool,
                                                          const KernelTable& kernels) {
-  Result<std::unique_ptr<AvatarNetwork>> network =
-      AvatarNetwork::create(avatar, body, precision, pool, kernels);
-  if (!network.ok()) return network.status();
-  std::unique_ptr<PosedAvatar> posed(new (std::nothrow)
-                                         PosedAvatar(avatar, body, blocks, pool, kernels));
+  std::unique_ptr<PosedAvatar> posed(
+      new (std::nothrow) PosedAvatar(avatar, body, blocks, precision, pool, kernels));
   if (posed == nullptr) return out_of_memory("an avatar");
-  posed->network_ = std::move(network).value();
+  if (avatar.has_network()) {
+    FIG_RETURN_IF_ERROR(posed->prepare_network(avatar, std::move(grid)));
+  } else if (avatar.static_part.empty()) {
+    return Status(StatusCode::kCorrupt, "avatar: neither a network nor a static part");
+  }
   FIG_RETURN_IF_ERROR(posed->shape(avatar));
+  FIG_RETURN_IF_ERROR(posed->static_blocks_.ensure(avatar.static_part, body));
   return posed;
+}
+
+Status PosedAvatar::prepare_network(const Avatar& avatar, std::shared_ptr<const BodyGrid> grid) {
+  const uint32_t size = avatar.network.input_size;
+  if (!grid_fits(body_.uv_size, size)) {
+    return Status(StatusCode::kCorrupt,
+                  "avatar: the network's grid has " + std::to_string(size) +
+                      " cells a side, which is not 1, 1/2, 1/4 or 1/8 of the body's " +
+                      std::to_string(body_.uv_size) + " texels");
+  }
+  grid_ = grid != nullptr ? std::move(grid) : BodyGrid::create(body_, size);
+  if (grid_ == nullptr) return out_of_memory("a grid over a body's texels");
+  if (!last_run_.rotations.ensure(size_t{4} * body_.joint_count()))
+    return out_of_memory("an avatar's pose");
+  Result<std::unique_ptr<AvatarNetwork>> network =
+      AvatarNetwork::create(avatar, *grid_, precision_, pool_, kernels_);
+  if (!network.ok()) return network.status();
+  network_ = std::move(network).value();
+  return {};
 }
 
 // The person's own joints and texels, the latter in blocks.
@@ -81,27 +105,92 @@ void PosedAvatar::select_blocks(const kernels::View* view, const LeaveOut& leave
   }
 }
 
-Status PosedAvatar::pose(const PoseView& pose, const kernels::View* view, const LeaveOut& leave_out,
-                         PoseScratch& scratch, StageClock& clock) {
-  {
-    const StageClock::Scope timed(clock, Stage::kSkin);
-    scratch.transforms.pose(body_, blocks_, joint_position_m_.span(size_t{3} * body_.joint_count()),
-                            pose, pool_, kernels_);
-    select_blocks(view, leave_out, scratch);
-  }
-  if (scratch.wanted_count == 0) return {};
+bool PosedAvatar::is_small(const PoseJob& job, const Transforms& transforms) const {
+  if (job.view == nullptr || !(job.approximation.network_below_px > 0)) return false;
+  BoxInImage box;
+  for (uint32_t block = 0; block < blocks_.count(); ++block)
+    widen(canonical_[block], transforms[block], *job.view, box);
+  return box.side_px() < job.approximation.network_below_px;
+}
+
+// To the bit: a zero of the other sign is another pose.
+bool PosedAvatar::is_last_pose(const PoseView& pose) const {
+  const auto same = [](const auto& a, const auto& b, size_t size_bytes) {
+    return std::memcmp(a.data(), b.data(), size_bytes) == 0;
+  };
+  return same(pose.rotations, last_run_.rotations, pose.rotations.size_bytes()) &&
+         same(pose.root_translation_m, last_run_.root_translation_m,
+              sizeof(last_run_.root_translation_m));
+}
+
+NetworkUse PosedAvatar::choose_use(const PoseJob& job, const PoseScratch& scratch) const {
+  if (network_ == nullptr || scratch.wanted_count == 0) return NetworkUse::kNone;
+  if (!last_run_.done) return NetworkUse::kRun;
+  if (job.leave_out.unchanged_networks && is_last_pose(job.pose)) return NetworkUse::kUnchanged;
+  const bool stale =
+      job.avatar && job.avatar == last_run_.avatar && is_small(job, scratch.transforms);
+  return stale ? NetworkUse::kStale : NetworkUse::kRun;
+}
+
+Status PosedAvatar::run_network(const PoseJob& job, const PoseScratch& scratch, StageClock& clock) {
+  last_run_.done = false;
   {
     const StageClock::Scope timed(clock, Stage::kMaps);
-    draw_maps(body_, blocks_, scratch.transforms, root_position(body_.mean_skeleton(), pose),
+    draw_maps(*grid_, blocks_, scratch.transforms, root_position(body_.mean_skeleton(), job.pose),
               statistics_, network_->input(), pool_, kernels_);
   }
   const StageClock::Scope timed(clock, Stage::kNetwork);
-  return network_->run(scratch.wanted_blocks());
+  FIG_RETURN_IF_ERROR(network_->run(scratch.wanted_blocks()));
+  std::copy(job.pose.rotations.begin(), job.pose.rotations.end(), last_run_.rotations.data());
+  last_run_.root_translation_m = job.pose.root_translation_m;
+  last_run_.avatar = job.avatar;
+  last_run_.done = true;
+  return {};
+}
+
+Result<NetworkUse> PosedAvatar::pose(const PoseJob& job, PoseScratch& scratch, StageClock& clock) {
+  NetworkUse use = NetworkUse::kNone;
+  {
+    const StageClock::Scope timed(clock, Stage::kSkin);
+    scratch.transforms.pose(body_, blocks_, joint_position_m_.span(size_t{3} * body_.joint_count()),
+                            job.pose, pool_, kernels_);
+    select_blocks(job.view, job.leave_out, scratch);
+    use = choose_use(job, scratch);
+  }
+  if (use == NetworkUse::kRun) {
+    FIG_RETURN_IF_ERROR(run_network(job, scratch, clock));
+  } else if (use != NetworkUse::kNone) {
+    const StageClock::Scope timed(clock, Stage::kNetwork);
+    network_->run_further(scratch.wanted_blocks());
+  }
+  return use;
+}
+
+// Where the heads of a block's texels are: of each, or of the cells that it lies between. Without a
+// network they are zeros.
+void PosedAvatar::find_heads(uint32_t block, kernels::DecodeSkinJob& job) const {
+  static constexpr float kNoHead[kernels::kShapeValues + kernels::kMaxShValues] = {};
+  if (network_ == nullptr) {
+    std::fill_n(job.head[0], kernels::kLanes, kNoHead);
+    return;
+  }
+  job.taps = grid_->taps(block);
+  if (job.taps != nullptr) {
+    for (uint32_t k = 0; k < kernels::kTaps; ++k)
+      network_->find_heads(job.taps->row[k], job.head[k]);
+    return;
+  }
+  uint32_t rows[kernels::kLanes];
+  for (uint32_t lane = 0; lane < kernels::kLanes; ++lane)
+    rows[lane] = texel_of_lane(block, lane, blocks_.texels());
+  network_->find_heads(rows, job.head[0]);
 }
 
 uint32_t PosedAvatar::decode(const PoseScratch& scratch, uint32_t block,
                              kernels::GaussianBlock& out) const {
   kernels::DecodeSkinJob job{.head = {},
+                             .taps = nullptr,
+                             .static_part = static_blocks_.of(block),
                              .texels = &canonical_[block],
                              .transforms = &scratch.transforms[block],
                              .offset_scale_m = decoding_.offset_scale_m,
@@ -112,15 +201,15 @@ uint32_t PosedAvatar::decode(const PoseScratch& scratch, uint32_t block,
                              .opacity_bias = decoding_.opacity_bias,
                              .sh_values = 3 * sh_coefficients(decoding_.sh_degree),
                              .gaussians = &out};
-  for (uint32_t lane = 0; lane < kernels::kLanes; ++lane) {
-    job.head[lane] = network_->head(texel_of_lane(block, lane, blocks_.texels()));
-  }
+  find_heads(block, job);
   kernels_.decode_skin(job);
   return std::min(kernels::kLanes, blocks_.texels() - block * kernels::kLanes);
 }
 
 uint64_t PosedAvatar::memory_bytes() const {
-  return network_->memory_bytes() + joint_position_m_.memory_bytes() + canonical_.memory_bytes();
+  return (network_ == nullptr ? 0 : network_->memory_bytes()) + last_run_.rotations.memory_bytes() +
+         joint_position_m_.memory_bytes() + canonical_.memory_bytes() +
+         static_blocks_.memory_bytes();
 }
 
 }  // namespace figurine

@@ -2,13 +2,19 @@
 // plan of a frame from a pose to world-space Gaussians.
 //
 //   pose -> transforms -> which texels are wanted -> maps of the mean template -> network
-//        -> wanted blocks: head decoding and linear blend skinning -> Gaussians
+//        -> wanted blocks: heads between a coarser network's, static part, decoding and linear
+//        blend
+//           skinning -> Gaussians
 //
+// Maps and network are left out where the network has said all of it before, and do not exist where
+// the avatar is its static part alone.
 // Based on: Loper et al., SMPL, 2015 (skinning); the head's parametrisation of figurine/avatar.h.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "figurine/avatar.h"
@@ -20,6 +26,8 @@
 #include "runtime/src/kernels/table.h"
 #include "runtime/src/pose/avatar_network.h"
 #include "runtime/src/pose/body_blocks.h"
+#include "runtime/src/pose/body_grid.h"
+#include "runtime/src/pose/static_blocks.h"
 #include "runtime/src/pose/transforms.h"
 
 namespace figurine {
@@ -39,55 +47,97 @@ struct PoseScratch {
   }
 };
 
+// A pose and what is wanted of it.
+struct PoseJob {
+  PoseView pose;  // must be valid for the body
+  // Whose it is, equal avatars sharing a PosedAvatar. None: that of no frame, which no later pose
+  // keeps anything of that is not exact.
+  std::optional<AvatarId> avatar;
+  const kernels::View* view = nullptr;  // null: all texels are wanted
+  LeaveOut leave_out;
+  Approximation approximation;
+};
+
+// How the outputs of the network for a pose came about.
+enum class NetworkUse : uint8_t {
+  kNone,       // nothing is wanted, or there is no network
+  kRun,        // the network ran
+  kUnchanged,  // its last run was for this pose
+  kStale       // its last run was for another pose of the avatar, which is small in the image
+};
+
 class PosedAvatar {
  public:
   // The arrays behind avatar and body are borrowed and must outlive the object, as must blocks,
-  // which are the body's. Errors: AvatarNetwork::create's; kCorrupt if the shape does not fit the
-  // body; kOutOfMemory.
+  // which are the body's. The static part must fit the body (validate_static_part). grid: the
+  // network's over the body if another avatar has it, otherwise null. Errors:
+  // AvatarNetwork::create's; kCorrupt if shape or grid do not fit the body; kOutOfMemory.
   static Result<std::unique_ptr<PosedAvatar>> create(const Avatar& avatar, const Body& body,
-                                                     const BodyBlocks& blocks, Precision precision,
-                                                     ThreadPool& pool, const KernelTable& kernels);
+                                                     const BodyBlocks& blocks,
+                                                     std::shared_ptr<const BodyGrid> grid,
+                                                     Precision precision, ThreadPool& pool,
+                                                     const KernelTable& kernels);
 
   const Body& body() const { return body_; }
   uint32_t block_count() const { return blocks_.count(); }
   uint32_t sh_degree() const { return decoding_.sh_degree; }
-  Precision precision() const { return network_->precision(); }
-  uint64_t macs() const { return network_->macs(); }
+  Precision precision() const { return precision_; }
+  uint64_t macs() const { return network_ == nullptr ? 0 : network_->macs(); }
+  // The network's; null without one.
+  const std::shared_ptr<const BodyGrid>& grid() const { return grid_; }
 
-  // Transforms, maps and network of a pose, which must be valid for the body. The scratch must have
-  // room and then says which blocks are wanted: all of them without a view.
-  Status pose(const PoseView& pose, const kernels::View* view, const LeaveOut& leave_out,
-              PoseScratch& scratch, StageClock& clock);
+  // Transforms, maps and network of a pose. The scratch must have room and then says which blocks
+  // are wanted.
+  Result<NetworkUse> pose(const PoseJob& job, PoseScratch& scratch, StageClock& clock);
 
   // The Gaussians of a wanted block of the last pose; returns how many lanes hold one. Callable by
   // several threads at a time.
   uint32_t decode(const PoseScratch& scratch, uint32_t block, kernels::GaussianBlock& out) const;
 
-  uint64_t memory_bytes() const;
+  uint64_t memory_bytes() const;  // without the grid, which others may share
 
  private:
-  PosedAvatar(const Avatar& avatar, const Body& body, const BodyBlocks& blocks, ThreadPool& pool,
-              const KernelTable& kernels)
+  PosedAvatar(const Avatar& avatar, const Body& body, const BodyBlocks& blocks, Precision precision,
+              ThreadPool& pool, const KernelTable& kernels)
       : body_(body),
         blocks_(blocks),
         pool_(pool),
         kernels_(kernels),
+        precision_(precision),
         statistics_(avatar.map_statistics),
         decoding_(avatar.decoding) {}
 
   Status shape(const Avatar& avatar);
+  Status prepare_network(const Avatar& avatar, std::shared_ptr<const BodyGrid> grid);
   void select_blocks(const kernels::View* view, const LeaveOut& leave_out,
                      PoseScratch& scratch) const;
+  NetworkUse choose_use(const PoseJob& job, const PoseScratch& scratch) const;
+  bool is_last_pose(const PoseView& pose) const;
+  bool is_small(const PoseJob& job, const Transforms& transforms) const;
+  Status run_network(const PoseJob& job, const PoseScratch& scratch, StageClock& clock);
+  void find_heads(uint32_t block, kernels::DecodeSkinJob& job) const;
+
+  // Which pose the network's last run was for.
+  struct LastRun {
+    bool done = false;
+    std::optional<AvatarId> avatar;
+    std::array<float, 3> root_translation_m{};
+    Buffer<float> rotations;  // [J,4]
+  };
 
   const Body body_;
   const BodyBlocks& blocks_;
   ThreadPool& pool_;
   const KernelTable& kernels_;
+  const Precision precision_;
   const MapStatistics statistics_;
   const HeadDecoding decoding_;
-  std::unique_ptr<AvatarNetwork> network_;
+  std::shared_ptr<const BodyGrid> grid_;    // in front of what borrows from it
+  std::unique_ptr<AvatarNetwork> network_;  // null: the static part is all there is
+  LastRun last_run_;
   Buffer<float> joint_position_m_;             // [J,3] of the template the Gaussians sit on
   Buffer<kernels::CanonicalBlock> canonical_;  // [blocks]
+  StaticBlocks static_blocks_;
 };
 
 }  // namespace figurine

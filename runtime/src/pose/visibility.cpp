@@ -30,15 +30,29 @@ bool touches(const Interval& mean_px, float reach_px, uint32_t size_px) {
          !(mean_px.high + reach_px < 0.5f);
 }
 
+// A texel in the world.
+void find_centre(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
+                 uint32_t lane, float* centre) {
+  for (uint32_t i = 0; i < 3; ++i) {
+    centre[i] = transforms.own_translation_m[i][lane];
+    for (uint32_t j = 0; j < 3; ++j)
+      centre[i] += transforms.linear[3 * i + j][lane] * texels.position_m[j][lane];
+  }
+}
+
+// In view coordinates.
+float along(const kernels::View& view, int axis, const float* point) {
+  const float* m = view.view_from_world + 4 * axis;
+  return (m[0] * point[0] + m[1] * point[1]) + (m[2] * point[2] + m[3]);
+}
+
 // A texel's Gaussian lies within `radius_m` of `centre` (world) and deviates by at most
 // deviation_m.
 bool sphere_may_be_seen(const float* centre, float radius_m, float deviation_m, float sigmas,
                         const kernels::View& view) {
-  const float* m = view.view_from_world;
   Interval seen[3];
   for (int i = 0; i < 3; ++i) {
-    const float at = (m[4 * i] * centre[0] + m[4 * i + 1] * centre[1]) +
-                     (m[4 * i + 2] * centre[2] + m[4 * i + 3]);
+    const float at = along(view, i, centre);
     seen[i] = {at - radius_m, at + radius_m};
   }
   if (seen[2].high <= view.near_m) return false;  // behind the near plane, wherever it is
@@ -88,10 +102,7 @@ bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::Transform
   for (uint32_t lane = 0; lane < kernels::kLanes; ++lane) {
     float a[9], centre[3];
     for (uint32_t i = 0; i < 9; ++i) a[i] = transforms.linear[i][lane];
-    for (uint32_t i = 0; i < 3; ++i) {
-      centre[i] = transforms.own_translation_m[i][lane];
-      for (uint32_t j = 0; j < 3; ++j) centre[i] += a[3 * i + j] * texels.position_m[j][lane];
-    }
+    find_centre(texels, transforms, lane, centre);
     const float stretch = largest_stretch(a) * kSlackRatio;
     float magnitude = 1;
     for (int i = 0; i < 3; ++i) {
@@ -105,6 +116,32 @@ bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::Transform
     if (sphere_may_be_seen(centre, radius_m, deviation_m, sigmas, view)) return true;
   }
   return false;
+}
+
+float BoxInImage::side_px() const {
+  const float width = right_px - left_px, height = bottom_px - top_px;
+  // Written so that anything not comparable counts as infinite.
+  const float longer = width > height ? width : height;
+  return longer < std::numeric_limits<float>::max() && longer >= 0
+             ? longer
+             : std::numeric_limits<float>::infinity();
+}
+
+void widen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
+           const kernels::View& view, BoxInImage& box) {
+  float centre[3];
+  find_centre(texels, transforms, 0, centre);
+  const float z = along(view, 2, centre);
+  if (!(z > view.near_m)) {
+    box.right_px = box.bottom_px = std::numeric_limits<float>::infinity();
+    return;
+  }
+  const float x = view.fx_px * (along(view, 0, centre) / z) + view.cx_px,
+              y = view.fy_px * (along(view, 1, centre) / z) + view.cy_px;
+  box.left_px = std::min(box.left_px, x);
+  box.right_px = std::max(box.right_px, x);
+  box.top_px = std::min(box.top_px, y);
+  box.bottom_px = std::max(box.bottom_px, y);
 }
 
 }  // namespace figurine

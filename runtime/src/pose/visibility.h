@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "figurine/avatar.h"
@@ -25,5 +26,17 @@ GaussianBounds bounds_of(const HeadDecoding& decoding);
 // Whether a block has a texel that may be seen.
 bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
                  const GaussianBounds& bounds, const kernels::View& view);
+
+// The smallest box in the image around texels of an avatar, as far as it is known.
+struct BoxInImage {
+  float left_px = std::numeric_limits<float>::infinity(), right_px = -left_px;
+  float top_px = left_px, bottom_px = -left_px;
+  // The longer one; infinite if a texel is not in front of the near plane, or nowhere.
+  float side_px() const;
+};
+
+// Widens the box by a block's first texel: enough to tell how large a figure is.
+void widen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
+           const kernels::View& view, BoxInImage& box);
 
 }  // namespace figurine

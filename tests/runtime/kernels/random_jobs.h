@@ -177,17 +177,34 @@ inline void compare(PoseMaps* a, PoseMaps* b) {
   }
 }
 
+// Weights that add up to 1, or some that do not.
+inline TapBlock make_taps(Random& random, bool hostile) {
+  TapBlock taps{};
+  fill(taps.weight, random, 0, 0.5f, hostile);
+  return taps;
+}
+
+inline StaticBlock make_static(Random& random, bool hostile) {
+  StaticBlock block{};
+  fill(block.sum, random, -2, 2, hostile);
+  fill(block.gain, random, 0.1f, 3, hostile);
+  return block;
+}
+
+// With and without taps and static part, of every SH degree, every other round hostile.
 inline void compare(DecodeSkin* a, DecodeSkin* b) {
   Random random(3);
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < 640; ++round) {
     const bool hostile = round % 2 == 1;
-    const uint32_t degree = static_cast<uint32_t>(round) % 4,
-                   sh_values = 3 * (degree + 1) * (degree + 1);
+    const uint32_t degree = static_cast<uint32_t>(round / 2) % 4,
+                   sh_values = 3 * (degree + 1) * (degree + 1), values = kShapeValues + sh_values;
     const TransformBlock transforms = make_transforms(random, hostile);
+    const TapBlock taps = make_taps(random, hostile);
+    const StaticBlock static_part = make_static(random, hostile);
     CanonicalBlock texels;
     fill(texels.position_m, random, -1, 1);
     for (float& extent : texels.extent_m) extent = random.uniform(0.001f, 0.01f);
-    std::vector<float> heads(kLanes * (11 + sh_values));
+    std::vector<float> heads(kTaps * kLanes * values);
     for (float& value : heads) {
       value = random.normal() * 3;
       if (hostile) value = strange(random, value);
@@ -196,6 +213,8 @@ inline void compare(DecodeSkin* a, DecodeSkin* b) {
     std::memset(static_cast<void*>(&of_a), 0x55, sizeof(of_a));
     std::memset(static_cast<void*>(&of_b), 0xaa, sizeof(of_b));
     DecodeSkinJob job{.head = {},
+                      .taps = round / 8 % 2 == 0 ? nullptr : &taps,
+                      .static_part = round / 16 % 2 == 0 ? nullptr : &static_part,
                       .texels = &texels,
                       .transforms = &transforms,
                       .offset_scale_m = 0.05f,
@@ -204,7 +223,10 @@ inline void compare(DecodeSkin* a, DecodeSkin* b) {
                       .opacity_bias = 2,
                       .sh_values = sh_values,
                       .gaussians = &of_a};
-    for (uint32_t lane = 0; lane < kLanes; ++lane) job.head[lane] = &heads[lane * (11 + sh_values)];
+    for (uint32_t k = 0; k < (job.taps == nullptr ? 1 : kTaps); ++k) {
+      for (uint32_t lane = 0; lane < kLanes; ++lane)
+        job.head[k][lane] = &heads[below(random, kTaps * kLanes) * values];
+    }
     a(job);
     job.gaussians = &of_b;
     b(job);

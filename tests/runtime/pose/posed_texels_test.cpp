@@ -10,6 +10,7 @@
 #include "figurine/gaussian.h"
 #include "runtime/src/base/float_math.h"
 #include "runtime/src/pose/body_blocks.h"
+#include "runtime/src/pose/body_grid.h"
 #include "runtime/src/pose/maps.h"
 #include "runtime/src/pose/transforms.h"
 #include "runtime/test_packages.h"
@@ -84,6 +85,8 @@ TEST_P(PosedTexels, MapsAreThoseOfTheDefinition) {
   const Body& body = body_.body();
   const MapStatistics statistics{.mean = {0.1f, 0.2f, -0.1f, 0, 0.05f, 0},
                                  .scale = {2, 2.5f, 3, 1, 1, 0.5f}};
+  const std::shared_ptr<const BodyGrid> grid = BodyGrid::create(body, body.uv_size);
+  ASSERT_TRUE(grid != nullptr && grid->of_texels());
   const uint32_t stride = kMapChannels + 2;
   const size_t values = size_t(body.uv_size) * body.uv_size * stride;
   for (const uint32_t threads : {1u, 3u}) {
@@ -94,7 +97,7 @@ TEST_P(PosedTexels, MapsAreThoseOfTheDefinition) {
       const SyntheticPose pose = tests::make_test_pose(body, frame);
       draw_pose_maps(body, pose.view(), statistics, scratch, stride, truth);
       transforms_.pose(body, blocks_, joints_, pose.view(), pool, kernels());
-      draw_maps(body, blocks_, transforms_, root_position(body.mean_skeleton(), pose.view()),
+      draw_maps(*grid, blocks_, transforms_, root_position(body.mean_skeleton(), pose.view()),
                 statistics, {maps.data(), stride}, pool, kernels());
       ASSERT_EQ(std::memcmp(truth.data(), maps.data(), values * sizeof(float)), 0)
           << "frame " << frame << ", " << threads << " threads";
@@ -157,6 +160,8 @@ TEST_P(PosedTexels, DecodingIsThatOfTheDefinition) {
     kernels::GaussianBlock block;
     kernels::DecodeSkinJob job{
         .head = {},
+        .taps = nullptr,
+        .static_part = nullptr,
         .texels = &texels,
         .transforms = &transforms,
         .offset_scale_m = decoding.offset_scale_m,
@@ -166,7 +171,7 @@ TEST_P(PosedTexels, DecodingIsThatOfTheDefinition) {
         .sh_values = sh_values,
         .gaussians = &block};
     for (uint32_t lane = 0; lane < kernels::kLanes; ++lane)
-      job.head[lane] = &heads[lane * (11 + sh_values)];
+      job.head[0][lane] = &heads[lane * (11 + sh_values)];
     kernels().decode_skin(job);
     for (uint32_t lane = 0; lane < kernels::kLanes; ++lane) {
       const float texel[3] = {texels.position_m[0][lane], texels.position_m[1][lane],
@@ -177,11 +182,12 @@ TEST_P(PosedTexels, DecodingIsThatOfTheDefinition) {
         transform.m[4 * i + 3] = transforms.own_translation_m[i][lane];
       }
       const Gaussian truth =
-          decode(decoding, job.head[lane], texel, texels.extent_m[lane], transform);
+          decode(decoding, job.head[0][lane], texel, texels.extent_m[lane], transform);
       for (int k = 0; k < 3; ++k) ASSERT_EQ(block.position_m[k][lane], truth.position[k]);
       for (int k = 0; k < 9; ++k) ASSERT_EQ(block.factor[k][lane], truth.factor[k]);
       ASSERT_EQ(block.opacity[lane], truth.opacity);
-      for (uint32_t k = 0; k < sh_values; ++k) ASSERT_EQ(block.sh[k][lane], job.head[lane][11 + k]);
+      for (uint32_t k = 0; k < sh_values; ++k)
+        ASSERT_EQ(block.sh[k][lane], job.head[0][lane][11 + k]);
     }
   }
 }

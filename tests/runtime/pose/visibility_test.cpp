@@ -92,6 +92,8 @@ TEST(Visibility, NothingThatProjectionSeesIsLeftOut) {
     kernels::GaussianBlock block;
     float heads[kernels::kLanes][14];
     kernels::DecodeSkinJob job{.head = {},
+                               .taps = nullptr,
+                               .static_part = nullptr,
                                .texels = &place.texels,
                                .transforms = &place.transforms,
                                .offset_scale_m = kBounded.offset_scale_m,
@@ -102,7 +104,7 @@ TEST(Visibility, NothingThatProjectionSeesIsLeftOut) {
                                .gaussians = &block};
     for (uint32_t lane = 0; lane < kernels::kLanes; ++lane) {
       for (float& value : heads[lane]) value = random.uniform(-2, 2);
-      job.head[lane] = heads[lane];
+      job.head[0][lane] = heads[lane];
     }
     const KernelTable& kernels = best_kernels();
     kernels.decode_skin(job);

@@ -82,23 +82,61 @@ TEST(RobustCentre, IsTheMiddleOfTheMassNotOfTheExtremes) {
   EXPECT_NEAR(centre[2], -1, 1e-6);
 }
 
+Body small_body(std::vector<std::string> joints) {
+  Body body;
+  body.name = "small";
+  body.joint_names = std::move(joints);
+  return body;
+}
+
+TEST(FramedJoints, AreFoundByName) {
+  const Body body = small_body({"pelvis", "neck", "left_collar", "head", "jaw"});
+  EXPECT_EQ(*framed_joints(body, Framing::kHead), (std::vector<uint8_t>{3, 4}));
+  EXPECT_EQ(*framed_joints(body, Framing::kBust), (std::vector<uint8_t>{3, 4, 2, 1}))
+      << "the head is the first";
+  const Result<std::vector<uint8_t>> none = framed_joints(small_body({"pelvis"}), Framing::kBust);
+  EXPECT_EQ(none.status().code(), StatusCode::kUnsupported);
+  EXPECT_EQ(none.status().message(), "framing: body 'small' has no joint called head");
+}
+
+TEST(FramedJoints, HoldTheTexelsThatTheyMoveMost) {
+  std::vector<uint8_t> joints(2 * kSkinInfluences, 0);
+  std::vector<float> weights(2 * kSkinInfluences, 0);
+  joints[1] = 2, weights[0] = 0.6f, weights[1] = 0.4f;
+  joints[kSkinInfluences + 1] = 2, joints[kSkinInfluences + 2] = 1;
+  weights[kSkinInfluences] = 0.1f, weights[kSkinInfluences + 1] = 0.7f;
+  weights[kSkinInfluences + 2] = 0.2f;
+  Body body = small_body({"pelvis", "neck", "head"});
+  body.texel_joints = joints;
+  body.texel_weights = weights;
+  const std::vector<uint8_t> head{2};
+  EXPECT_FALSE(moved_most_by(body, 0, head));
+  EXPECT_TRUE(moved_most_by(body, 1, head));
+}
+
+TEST(Framing, IsOneOfThree) {
+  EXPECT_EQ(*parse_framing("bust"), Framing::kBust);
+  EXPECT_EQ(parse_framing("feet").status().code(), StatusCode::kInvalidArgument);
+}
+
 TEST(SmoothPath, KeepsAStraightWalkAndFlattensBobbing) {
-  std::vector<std::array<float, 2>> straight, bobbing;
+  std::vector<Point> straight, bobbing;
   for (int i = 0; i < 100; ++i) {
     const float x = 0.04f * static_cast<float>(i);
-    straight.push_back({x, 1 - x});
-    bobbing.push_back({x, 1 - x + 0.03f * std::sin(0.9f * static_cast<float>(i))});
+    straight.push_back({x, 1 - x, 0.5f * x});
+    bobbing.push_back({x, 1 - x + 0.03f * std::sin(0.9f * static_cast<float>(i)), 0.5f * x});
   }
   const auto smooth_straight = smooth_path(straight, 12), smooth_bobbing = smooth_path(bobbing, 12);
   for (size_t i = 0; i < straight.size(); ++i) {
     EXPECT_NEAR(smooth_straight[i][0], straight[i][0], 1e-5) << i;  // at the ends, too
     EXPECT_NEAR(smooth_straight[i][1], straight[i][1], 1e-5) << i;
+    EXPECT_NEAR(smooth_straight[i][2], straight[i][2], 1e-5) << i;
     EXPECT_NEAR(smooth_bobbing[i][1], straight[i][1], 0.01) << i;
   }
 }
 
 TEST(SmoothPath, OneFrameStaysWhereItIs) {
-  const std::array<float, 2> place{3, 4};
+  const Point place{3, 4, 5};
   EXPECT_EQ(smooth_path({&place, 1}, 12)[0], place);
 }
 

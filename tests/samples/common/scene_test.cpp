@@ -71,6 +71,21 @@ class Ending final : public PoseSource {
   PoseView pose_;
 };
 
+TEST_F(Scenes, JointsAreWhereThePlaceTurnsThem) {
+  Scene here = load({"0,0"}, 1), turned = load({"3,1,90"}, 1);
+  for (uint32_t frame : {0u, 7u}) {
+    here.pose(frame), turned.pose(frame);
+    const std::array<float, 3> root = here.joint_m(0, 0), head = here.joint_m(0, 2),
+                               turned_head = turned.joint_m(0, 2);
+    for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(root[k], here.root_m(0)[k], 1e-6);
+    EXPECT_NE(head, root);
+    // By 90 degrees about the vertical, +z becomes +x and +x becomes -z.
+    EXPECT_NEAR(turned_head[0], 3 + head[2], 1e-5);
+    EXPECT_NEAR(turned_head[1], head[1], 1e-5);
+    EXPECT_NEAR(turned_head[2], 1 - head[0], 1e-5);
+  }
+}
+
 TEST_F(Scenes, ASourceIsAskedAndItsEndIsTold) {
   Scene scene = load();
   const std::vector<float> before = numbers_of(scene.pose(0));

@@ -231,6 +231,13 @@ TEST_F(Cli, TheCameraThatJsonPrintsCanBeGivenBack) {
   EXPECT_EQ(pfm("c.pfm").width_px, 32u);
 }
 
+TEST_F(Cli, FramingIsRefusedWhereItCannotBe) {
+  expect_refused("render P/avatar.fgn --framing bust -o x.png", 1,
+                 "framing: body 'jointed cylinder' has no joint called head");
+  EXPECT_EQ(run("render P/avatar.fgn --framing feet -o x.png").exit_code, 2);
+  EXPECT_EQ(run("render P/avatar.fgn --framing body --size 64x64 -o x.png").exit_code, 0);
+}
+
 TEST_F(Cli, SeveralAvatarsStandSideBySide) {
   ASSERT_EQ(run("render P/avatar.fgn --size 120x60 -o one.png").exit_code, 0);
   ASSERT_EQ(run("render P/avatar.fgn P/avatar.fgn --spacing 1.5 --camera orbit:0,0,6 --size 120x60 "
@@ -366,6 +373,25 @@ TEST_F(Cli, BenchReportsEveryStage) {
   }
   EXPECT_GT(json["peak_memory_bytes"], 0);
   EXPECT_GT(json["first_frame_ms"]["total"], 0.0);
+}
+
+TEST_F(Cli, SmallFiguresMayKeepWhatTheirNetworkSaid) {
+  const auto work = [&](const std::string& option) {
+    const ProgramRun result =
+        run("render P/avatar.fgn --motion P/motion.fgn --frames 0:4 --size "
+            "64x64 --json -o x_%02d.png " +
+            option);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return Json::parse(result.out);
+  };
+  EXPECT_EQ(work("")["work"]["networks"], 1.0);
+  EXPECT_EQ(work("")["network_below_px"], 0.0);
+  const Json kept = work("--network-below-px 100");
+  EXPECT_EQ(kept["network_below_px"], 100.0);
+  EXPECT_EQ(kept["work"]["networks"], 0.25);
+  EXPECT_EQ(kept["work"]["stale_networks"], 0.75);
+  EXPECT_EQ(work("--network-below-px 8")["work"]["networks"], 1.0);
+  EXPECT_EQ(run("render P/avatar.fgn -o x.png --network-below-px -1").exit_code, 2);
 }
 
 TEST_F(Cli, BenchMeasuresEveryPrecisionThatThePackageHolds) {

@@ -71,8 +71,9 @@ void expect_refused(const Outcome& run, const std::string& words) {
 }
 
 TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
-  for (const std::string kind : {"body", "avatar", "fixed_point_avatar", "motion", "population",
-                                 "half_population", "sampler"}) {
+  for (const std::string kind :
+       {"body", "avatar", "fixed_point_avatar", "static_avatar", "static_only_avatar", "motion",
+        "population", "half_population", "sampler"}) {
     const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");
@@ -107,6 +108,26 @@ TEST(Inspect, PrintsWhatADeviceNeedsToKnow) {
                             "8x8 texels, 5 covered, 3 border", "body.texel_weights", "[5,8]"}) {
     EXPECT_TRUE(contains(body.out, words)) << words << "\n" << body.out;
   }
+}
+
+TEST(Inspect, SaysWhatTakesHowManyBytes) {
+  const Outcome parts = inspect("static_avatar_v1.fgn");
+  EXPECT_EQ(parts.exit_code, 0) << parts.err;
+  for (const char* words :
+       {"header                         64", "network in float             1188",
+        "static part                    93", "pose statistics                48",
+        "golden frame                   81", "shape coefficients              8",
+        "map               8x8 texels", "input 4x4x10, 5 layers", "static part       93 bytes",
+        "channels 0 to 10: 2 cells of 2x2, 66 bytes", "channels 11 to 13: 5 cells of 8x8, 27 bytes",
+        "required 0x4"}) {
+    EXPECT_TRUE(contains(parts.out, words)) << words << "\n" << parts.out;
+  }
+  const Outcome only = inspect("static_only_avatar_v1.fgn");
+  for (const char* words : {"network           none", "precision         f32, q8"})
+    EXPECT_TRUE(contains(only.out, words)) << words << "\n" << only.out;
+  EXPECT_FALSE(contains(only.out, "network in"));
+  EXPECT_TRUE(contains(inspect("avatar_v1.fgn").out, "static part       none"));
+  EXPECT_TRUE(contains(inspect("fixed_point_avatar_v1.fgn").out, "network in fixed point"));
 }
 
 TEST(Inspect, ListsThePopulationsMembers) {

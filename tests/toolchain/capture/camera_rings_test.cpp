@@ -49,6 +49,43 @@ TEST(CameraRings, NoCameraIsCalled41) {
   EXPECT_EQ(numbers.count(41), 0u);
 }
 
+// The largest |image coordinate| of a point, 1 at the border.
+float coordinate(const Camera& c, const Vec3& p) {
+  const auto& m = c.view_from_world;
+  const float z = m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11];
+  return std::max(std::fabs(m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3]) * c.fx_px / z / c.cx_px,
+                  std::fabs(m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7]) * c.fy_px / z / c.cy_px);
+}
+
+TEST(CameraRings, ABustRingHoldsHeadsButForRarePoses) {
+  // Heads of 100 poses, one of them crouching.
+  std::vector<Vec3> heads;
+  for (int pose = 0; pose < 100; ++pose) {
+    const float sway = 0.001f * static_cast<float>(pose % 50), y = pose == 7 ? 0.9f : 1.45f;
+    for (float up : {0.0f, 0.3f}) heads.push_back({0.2f - sway, y + up, sway});
+  }
+  const std::vector<RingCamera> cameras =
+      make_camera_rings({.views = 4, .bust_views = 6}, box(), heads);
+  ASSERT_EQ(cameras.size(), 10u);
+  const std::vector<RingCamera> body = make_camera_rings({.views = 4}, box());
+  size_t inside = 0;
+  for (size_t c = 0; c < cameras.size(); ++c) {
+    const RingCamera& camera = cameras[c];
+    EXPECT_EQ(camera.number, c + 1);
+    EXPECT_EQ(camera.framing, c < 4 ? dataset::Framing::kBody : dataset::Framing::kBust);
+    EXPECT_EQ(camera.name[0], c < 4 ? 'C' : 'B');
+    EXPECT_EQ(camera.camera.fx_px, cameras[0].camera.fx_px) << "one lens for all";
+    if (c < 4) {
+      EXPECT_EQ(camera.camera.view_from_world, body[c].camera.view_from_world);
+      continue;
+    }
+    for (const Vec3& p : heads) inside += coordinate(camera.camera, p) <= 0.9601f;
+    EXPECT_GT(coordinate(camera.camera, {0, 0, 0}), 1.5f) << "feet are far outside";
+  }
+  EXPECT_GE(inside, 6 * 196u);
+  EXPECT_LE(inside, 6 * 198u) << "crouching poses would need cameras from further away";
+}
+
 body::MotionClip counting_clip(uint32_t frames) {
   body::MotionClip clip;
   clip.name = "counting";

@@ -190,6 +190,8 @@ TEST(Capture, ReaderFindsSplitsAndProvenance) {
   for (size_t f = 0; f < 15; ++f) {
     for (size_t c = 0; c < 6; ++c) ++roles[data.role(f, c)];
   }
+  for (const dataset::CaptureCamera& camera : data.cameras())
+    EXPECT_EQ(camera.framing, dataset::Framing::kBody);
   EXPECT_EQ(roles[dataset::Role::kHeldOutView], 12);
   EXPECT_EQ(roles[dataset::Role::kHeldOutPoseBlock], 10);
   EXPECT_EQ(roles[dataset::Role::kHeldOutPoseInterleaved], 5);
@@ -198,6 +200,48 @@ TEST(Capture, ReaderFindsSplitsAndProvenance) {
               dataset::Dataset::open(finished(), {.body_hash = std::string(32, '0')});
             }).find("body"),
             std::string::npos);
+}
+
+TEST(Capture, BustCamerasStandBesideTheOthersAndChangeNothingForThem) {
+  const TemporaryFolder folder;
+  CaptureRequest request = small_request(folder.path());
+  request.frames = 3;
+  request.cameras.bust_views = 7;
+  request.cameras.bust_scale = 0.75f;
+  capture(request);
+  const std::string identity = folder.path() + "/000000";
+  const dataset::Dataset data = dataset::Dataset::open(identity);
+  ASSERT_EQ(data.cameras().size(), 13u);
+  size_t held_out[2] = {0, 0}, filled[2] = {0, 0};
+  for (size_t c = 0; c < 13; ++c) {
+    const bool bust = data.cameras()[c].framing == dataset::Framing::kBust;
+    EXPECT_EQ(bust, c >= 6);
+    EXPECT_EQ(data.cameras()[c].name[0], bust ? 'B' : 'C');
+    held_out[bust] += data.cameras()[c].held_out;
+    const Camera& camera = data.cameras()[c].camera;
+    EXPECT_EQ(camera.width_px, bust ? 72u : 96u);
+    EXPECT_EQ(camera.height_px, bust ? 60u : 80u);
+    EXPECT_NEAR(camera.cx_px, 0.5f * static_cast<float>(camera.width_px), 1e-4);
+    EXPECT_NEAR(camera.fy_px / static_cast<float>(camera.height_px),
+                data.cameras()[0].camera.fy_px / 80, 1e-6)
+        << "one lens";
+    for (const uint8_t alpha : data.load_image(0, c).alpha) filled[bust] += alpha > 127;
+  }
+  EXPECT_EQ(held_out[0], 1u);
+  EXPECT_EQ(held_out[1], 1u) << "one in six of each framing";
+  EXPECT_GT(filled[1] * 6, filled[0] * 7) << "more pixels of person than in a larger image";
+
+  request.cameras.bust_views = 0;
+  const TemporaryFolder other;
+  request.output = other.path();
+  capture(request);
+  const std::map<std::string, std::string> with = all_files(identity),
+                                           without = all_files(other.path() + "/000000");
+  EXPECT_EQ(without.at("figurine.json").find("bust"), std::string::npos) << "as ever";
+  for (const auto& [name, bytes] : without) {
+    if (name == "figurine.json" || name == "camera_extrinsics.json") continue;
+    EXPECT_EQ(with.at(name), bytes) << name;
+  }
 }
 
 // Joints deep inside the body, skinned with the pose that was read and projected with the camera
@@ -290,6 +334,7 @@ TEST(Capture, DamagedFigurineJsonIsNamed) {
       {"shape", "[null]"},
       {"background", "\"green\""},
       {"held_out_cameras", "[\"C99\"]"},
+      {"bust_cameras", "[\"B07\"]"},
       {"frames", "[]"},
       {"body", "{}"}};
   for (const auto& [field, value] : damages) {

@@ -1,12 +1,15 @@
 // The wardrobe against the real data: everything named exists, fits and is held to its licence.
 #include "toolchain/capture/wardrobe.h"
 
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <set>
 
 #include "gtest/gtest.h"
+#include "toolchain/body/atlas.h"
 #include "toolchain/body/makehuman_model.h"
+#include "toolchain/body/mannequin.h"
 #include "toolchain/body/texel_body.h"
 #include "toolchain/capture/cover.h"
 #include "toolchain/capture/person.h"
@@ -223,6 +226,71 @@ TEST(Person, ShapeCoefficientsDescribeThePersonWithinAMillimetre) {
   }
   EXPECT_LT(worst, 0.001);
   std::printf("largest mean distance left by 20 coefficients: %.2f mm\n", 1e3 * worst);
+}
+
+// A body package's view in the layout that the mesh brings, or in one of other densities.
+body::TexelBody texels_of(body::BodyModel model, uint32_t size, bool weighted) {
+  if (weighted) {
+    body::AtlasOptions atlas{.uv_size = size, .coarsest_grid = size / 2, .attempts = 50};
+    atlas.weight[static_cast<size_t>(body::BodyPart::kHands)] = 2;
+    model.surface = body::pack_atlas(model.surface, atlas);
+  }
+  body::TexelBody texels = body::make_texel_body(model, size);
+  texels.states_mesh_places = weighted;
+  return texels;
+}
+
+TEST(ShapeFit, FindsTheCoefficientsInAnyLayout) {
+  const body::BodyModel model = body::make_mannequin();
+  const std::vector<float> shape = {0.5f, -1.25f, 0.75f, 0.25f};
+  body::Surface person = model.surface;
+  person.position_m = body::shaped_vertices(model, shape);
+  for (const bool weighted : {false, true}) {
+    const body::TexelBody texels = texels_of(model, 64, weighted);
+    const ShapeFit fit = fit_shape(texels.view(), person);
+    ASSERT_EQ(fit.shape.size(), shape.size());
+    for (size_t s = 0; s < shape.size(); ++s) EXPECT_NEAR(fit.shape[s], shape[s], 1e-4) << s;
+    EXPECT_LT(fit.error_m, 1e-6);
+  }
+}
+
+TEST(ShapeFit, RefusesTexelsOfAnotherMesh) {
+  const body::BodyModel model = body::make_mannequin();
+  for (const uint32_t shift : {1u << 30, 3000u}) {  // beyond the mesh, and on another limb
+    body::TexelBody texels = texels_of(model, 32, true);
+    for (uint32_t& triangle : texels.triangle)
+      triangle =
+          shift == 3000 ? (triangle + shift) % model.surface.triangle_count() : triangle + shift;
+    try {
+      fit_shape(texels.view(), model.surface);
+      ADD_FAILURE() << "no error";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("--body: its texels are not those of this mesh"),
+                std::string::npos);
+    }
+  }
+}
+
+// Coefficients differ, because every texel counts alike and the layouts have them elsewhere; the
+// person hardly does.
+TEST(ShapeFit, OfAMakeHumanPersonIsNearlyTheSameInAnyLayout) {
+  const body::BodyModel model =
+      body::make_makehuman_model(makehuman(), {.coefficients = 5, .samples = 30});
+  std::vector<std::vector<float>> fitted;
+  for (const bool weighted : {false, true}) {
+    const body::TexelBody texels = texels_of(model, 64, weighted);
+    fitted.push_back(body::shaped_vertices(
+        model, make_makehuman_person({.seed = 1}, makehuman(), directory(), texels.view()).shape));
+  }
+  double apart_m = 0;
+  for (size_t i = 0; i < fitted[0].size(); i += 3) {
+    double square = 0;
+    for (size_t k = i; k < i + 3; ++k)
+      square += (double{fitted[0][k]} - fitted[1][k]) * (double{fitted[0][k]} - fitted[1][k]);
+    apart_m += std::sqrt(square) / static_cast<double>(fitted[0].size() / 3);
+  }
+  std::printf("fits in two layouts: %.2f mm apart\n", 1e3 * apart_m);
+  EXPECT_LT(apart_m, 0.002);  // five coefficients leave some millimetres of a person
 }
 
 TEST(Person, RefusesABodyOfOtherTexels) {

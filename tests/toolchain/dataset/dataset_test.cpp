@@ -51,6 +51,7 @@ TEST(Dataset, LeavesOutCamera41AndFramesWithoutPose) {
   const Dataset data = open(folder.path());
   ASSERT_EQ(data.cameras().size(), 2u);
   EXPECT_EQ(data.cameras()[1].name, test::camera_name(2));
+  EXPECT_EQ(data.cameras()[1].framing, Framing::kBody) << "where nothing is said";
   EXPECT_EQ(data.cameras_left_out(), 1u);
   ASSERT_EQ(data.frames().size(), 3u);
   EXPECT_EQ(data.frames_without_pose(), 1u);

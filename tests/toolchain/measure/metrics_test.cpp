@@ -126,9 +126,71 @@ TEST(HighPass, OfEqualPicturesIsOneAndOfAFlatOneZero) {
   }
   EXPECT_NEAR(high_pass(truth, truth).ratio(), 1, 1e-12);
   EXPECT_NEAR(high_pass(filled(9, 9, {128, 128, 128, 255}), truth).ratio(), 0, 1e-12);
-  // A checkerboard's binomial blur is 1/2 everywhere: each of 7x7 inner pixels and 3 channels has
-  // energy 1/4.
-  EXPECT_NEAR(high_pass(truth, truth).truth, 49 * 3 * 0.25, 1e-6);
+  // A checkerboard's 3x3 mean is 5/9 on white and 4/9 on black: each of 7x7 inner pixels and 3
+  // channels has energy (4/9)^2.
+  EXPECT_NEAR(high_pass(truth, truth).truth, 49 * 3 * 16.0 / 81, 1e-6);
+}
+
+// One bright pixel in a grey picture: high-pass 8/9 of its height there, -1/9 at the eight around
+// it, so that its energy is 8/9 of its height squared.
+Picture with_dot(int x, int y, uint8_t level) {
+  Picture picture = filled(12, 12, {51, 51, 51, 255});
+  set(picture, x, y, {level, level, level, 255});
+  return picture;
+}
+
+TEST(HighPass, OfADotIsEightNinthsOfItsHeightSquared) {
+  const HighPass both = high_pass(with_dot(5, 5, 102), with_dot(5, 5, 153));  // 0.2 and 0.4 high
+  EXPECT_NEAR(both.truth, 3 * 8.0 / 9 * 0.16, 1e-6);
+  EXPECT_NEAR(both.ratio(), 0.25, 1e-6);
+  EXPECT_NEAR(both.correlation(), 1, 1e-6) << "half as sharp, but the same detail";
+}
+
+TEST(HighPass, CorrelationTellsDetailFromNoise) {
+  // A dot far from the truth's: as sharp, and nothing in common.
+  const HighPass elsewhere = high_pass(with_dot(8, 5, 153), with_dot(3, 5, 153));
+  EXPECT_NEAR(elsewhere.ratio(), 1, 1e-6);
+  EXPECT_NEAR(elsewhere.correlation(), 0, 1e-6);
+  // Dark instead of bright: the opposite detail.
+  EXPECT_NEAR(high_pass(with_dot(5, 5, 0), with_dot(5, 5, 102)).correlation(), -1, 1e-6);
+  // Right beside it: -1/9 meets 8/9 twice, and (-1/9)^2 four times; over 8/9.
+  EXPECT_NEAR(high_pass(with_dot(6, 5, 153), with_dot(5, 5, 153)).correlation(),
+              (-2 * 8.0 / 81 + 4 * 1.0 / 81) / (8.0 / 9), 1e-6);
+  EXPECT_EQ(high_pass(filled(12, 12, {51, 51, 51, 255}), with_dot(5, 5, 153)).correlation(), 0);
+}
+
+TEST(HighPass, PoolsEnergiesBeforeTheRatio) {
+  HighPass pooled = high_pass(with_dot(5, 5, 153), with_dot(5, 5, 153));
+  pooled.add(high_pass(with_dot(8, 5, 153), with_dot(3, 5, 153)));
+  EXPECT_NEAR(pooled.ratio(), 1, 1e-6);
+  EXPECT_NEAR(pooled.correlation(), 0.5, 1e-6);
+}
+
+TEST(Filled, LooksThreePixelsInsideTheMask) {
+  // 9x9 of foreground in 13x13: 3x3 pixels are more than 3 away from its outline.
+  Picture truth = filled(13, 13, {0, 0, 0, 0});
+  for (int y = 2; y < 11; ++y) {
+    for (int x = 2; x < 11; ++x) set(truth, x, y, {9, 9, 9, 255});
+  }
+  Picture prediction = truth;
+  EXPECT_EQ(count_filled(prediction, truth).inside, 9u);
+  EXPECT_EQ(count_filled(prediction, truth).share(), 1);
+  set(prediction, 6, 6, {9, 9, 9, 250});  // 0.9804
+  EXPECT_EQ(count_filled(prediction, truth).filled, 9u);
+  set(prediction, 6, 6, {9, 9, 9, 249});  // 0.9765
+  set(prediction, 4, 6, {0, 0, 0, 0});    // two from the outline: no hole
+  EXPECT_EQ(count_filled(prediction, truth).filled, 8u);
+  // What can be seen through in truth has nothing to fill, but is foreground to its neighbours.
+  set(truth, 6, 6, {9, 9, 9, 249});
+  EXPECT_EQ(count_filled(prediction, truth).inside, 8u);
+  EXPECT_EQ(count_filled(prediction, truth).filled, 8u);
+  set(truth, 6, 6, {9, 9, 9, 127});
+  EXPECT_TRUE(std::isnan(count_filled(prediction, truth).share()));
+}
+
+TEST(Filled, LeavesOutWhereThePictureCutsThePerson) {
+  const Picture truth = filled(8, 7, {9, 9, 9, 255});
+  EXPECT_EQ(count_filled(truth, truth).inside, 2u) << "nobody knows what lies beyond the border";
 }
 
 TEST(HighPass, LeavesTheSilhouetteOut) {

@@ -33,6 +33,9 @@ TEST(Recipe, SaysWhoIsMadeAndHow) {
   EXPECT_EQ(recipe.training.views_per_pose, 2u);
   EXPECT_FALSE(recipe.training.bf16);
   EXPECT_EQ(recipe.cameras.width_px, 64u);
+  EXPECT_EQ(recipe.cameras.bust_views, 0u) << "as before there were any";
+  json["capture"]["bust_views"] = 3;
+  EXPECT_EQ(read(json).cameras.bust_views, 3u);
   const std::vector<Identity> people = identities_of(recipe);
   ASSERT_EQ(people.size(), 4u);
   EXPECT_EQ(people[3].name(), "000010");

@@ -1,6 +1,6 @@
 // A small real capture for tests of the trainer: the mannequin, swinging, from 8 cameras at
-// 128x128, with a body package at T = 32. Made once per program, about two seconds, in a folder
-// that is removed at the end.
+// 128x128, its head and shoulders from 2 at 96x96, with a body package at T = 32. Made once per
+// program, about two seconds, in a folder that is removed at the end.
 #pragma once
 
 #include <cmath>
@@ -26,19 +26,23 @@ struct SmallCapture {
   std::string body = folder.path("mannequin.fgn");
   std::string data = folder.path("capture") + "/" + capture::identity_name(0);
 
-  SmallCapture() {
-    const body::TexelBody texels = body::make_texel_body(body::make_mannequin(), 32);
+  // On the mannequin in its own layout.
+  SmallCapture() : SmallCapture(body::make_texel_body(body::make_mannequin(), 32)) {}
+
+  explicit SmallCapture(const body::TexelBody& texels) {
     const auto bytes = value_or_throw(write_package(texels.view(), {.tool = "test"}), body);
     throw_if_error(ports::write_file_atomically(body, bytes), body);
     const train::PackageFile package = train::open_package(body, PackageKind::kBody);
-    capture::capture_identities({.output = folder.path("capture"),
-                                 .seed = 5,
-                                 .frames = 32,
-                                 .cameras = {.views = 8, .width_px = 128, .height_px = 128},
-                                 .threads = 2,
-                                 .tool = "test",
-                                 .sources = {"swinging: made by the test"}},
-                                package.package, {swinging_clip(120)}, nullptr);
+    capture::capture_identities(
+        {.output = folder.path("capture"),
+         .seed = 5,
+         .frames = 32,
+         .cameras =
+             {.views = 8, .bust_views = 2, .bust_scale = 0.75f, .width_px = 128, .height_px = 128},
+         .threads = 2,
+         .tool = "test",
+         .sources = {"swinging: made by the test"}},
+        package.package, {swinging_clip(120)}, nullptr);
   }
 
  private:

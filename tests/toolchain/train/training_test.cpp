@@ -3,14 +3,18 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/toolchain/train/small_capture.h"
 #include "toolchain/error.h"
+#include "toolchain/pictures/contact_sheet.h"
 #include "toolchain/reconstruction/reconstruction.h"
 #include "toolchain/tensor_operations.h"
+#include "toolchain/train/facing.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/lanes.h"
 #include "toolchain/train/pack_avatar.h"
@@ -70,6 +74,80 @@ TEST(Training, BeatsAFlatColourOnHeldOutViewsAndPoses) {
     std::printf("%s: %.2f dB, flat colour %.2f dB\n", group, psnr, flat);
     EXPECT_GT(psnr, flat + 2) << group;
   }
+}
+
+TEST(Evaluation, TellsCloseUpsFromWholePeople) {
+  TrainedAvatar avatar = TrainedAvatar::open({.run = trained_run()});
+  const nlohmann::json report = reconstruction::evaluate_reconstruction(avatar, {.quiet = true});
+  const nlohmann::json &poses = report.at("held_out_poses"), &views = report.at("held_out_views");
+  const dataset::Dataset& data = avatar.data();
+  const auto held_out =
+      std::count_if(data.frames().begin(), data.frames().end(),
+                    [](const auto& frame) { return frame.split != dataset::FrameSplit::kTrain; });
+  EXPECT_EQ(poses.at("images"), 7 * held_out) << "one of eight cameras is held out";
+  EXPECT_EQ(poses.at("bust_images"), 2 * held_out);
+  EXPECT_FALSE(views.contains("bust_images")) << "of two cameras none is held out";
+  for (const char* key : {"bust_psnr_db", "bust_head_psnr_db"}) {
+    EXPECT_GT(poses.at(key).get<double>(), 10) << key;
+    EXPECT_NE(poses.at(key), poses.at(std::string(key).substr(5)));
+  }
+  for (const char* prefix : {"", "bust_"}) {
+    const double correlation = poses.at(std::string(prefix) + "highpass_correlation"),
+                 filled = poses.at(std::string(prefix) + "filled_share");
+    EXPECT_GT(correlation, 0) << prefix << "even so little training has found some of the detail";
+    EXPECT_LE(correlation, 1) << prefix;
+    EXPECT_GE(filled, 0) << prefix;
+    EXPECT_LE(filled, 1) << prefix;
+  }
+}
+
+TEST(ContactSheet, ShowsHeadAndShouldersBelowWholePeople) {
+  TrainedAvatar avatar = TrainedAvatar::open({.run = trained_run()});
+  const ports::ImageU8 sheet = pictures::make_contact_sheet(
+      avatar, {.pairs = 1, .person_height_px = 60, .detail_height_px = 20});
+  // One pair of square tiles between the rows of 60 and of twice 20, and gaps of 4.
+  const uint32_t tile = (sheet.width_px - 12) / 2;
+  EXPECT_EQ(sheet.height_px, 60 + tile + 2 * 20 + 5 * 4);
+  bool drawn = false;
+  for (uint32_t y = 68; y < 68 + tile; ++y) drawn = drawn || sheet.at(4, y)[0] != 255;
+  EXPECT_TRUE(drawn) << "the row is not left white";
+}
+
+TEST(GoldenView, ShowsTheFace) {
+  const TrainedAvatar avatar = TrainedAvatar::open({.run = trained_run()});
+  const GoldenView view = choose_golden_view(avatar);
+  // The same pose through the eyes of the rule itself, and no better one in the block.
+  dataset::CaptureFrame golden;
+  golden.rotations = view.pose.rotations;
+  const float chosen = facing(avatar.body(), golden, view.camera);
+  EXPECT_GT(chosen, 0.8f);
+  for (const dataset::CaptureFrame& frame : avatar.data().frames()) {
+    if (frame.split != dataset::FrameSplit::kBlock) continue;
+    for (const dataset::CaptureCamera& camera : avatar.data().cameras()) {
+      if (camera.framing != dataset::Framing::kBody) continue;
+      EXPECT_LE(facing(avatar.body(), frame, camera.camera), chosen);
+    }
+  }
+}
+
+TEST(Facing, IsTheCosineBetweenTheFaceAndTheWayToTheCamera) {
+  const PackageFile body = open_package(small_capture().body, PackageKind::kBody);
+  dataset::CaptureFrame frame;
+  for (uint32_t j = 0; j < dataset::kSmplxJoints; ++j)
+    frame.rotations.insert(frame.rotations.end(), {1, 0, 0, 0});
+  const auto seen_from = [](float azimuth_deg) {
+    return make_orbit_camera({.azimuth_deg = azimuth_deg}, 64, 64).value();
+  };
+  EXPECT_NEAR(facing(body.package.body(), frame, seen_from(0)), 1, 1e-6);
+  EXPECT_NEAR(facing(body.package.body(), frame, seen_from(60)), 0.5, 1e-6);
+  EXPECT_NEAR(facing(body.package.body(), frame, seen_from(180)), -1, 1e-6);
+  // The root turns by 90 degrees towards +x, the head nods by 60 (about its own axis, now along
+  // -z).
+  const float half = std::sqrt(0.5f);
+  frame.rotations[0] = half, frame.rotations[2] = half;
+  EXPECT_NEAR(facing(body.package.body(), frame, seen_from(90)), 1, 1e-6);
+  frame.rotations[15 * 4] = std::sqrt(0.75f), frame.rotations[15 * 4 + 1] = 0.5f;
+  EXPECT_NEAR(facing(body.package.body(), frame, seen_from(90)), 0.5, 1e-6);
 }
 
 TEST(Training, LowersTheLossFromTheFirstLogRowToTheLast) {
@@ -477,6 +555,27 @@ TEST(SampleFeed, CropHoldsTheMaskAndItsMargin) {
   EXPECT_EQ(target[3][0][0].item<float>(), 0);
   EXPECT_EQ(target[0][0][0].item<float>(), 0);
   EXPECT_NEAR(target[0][6][18].item<float>(), 7 / 255.0, 1e-6);
+}
+
+TEST(SampleFeed, CropOfAPersonWhomTheBorderCutsEndsThere) {
+  // Head and shoulders: the mask runs out of the image below and to the right.
+  dataset::CaptureImage image{.width_px = 12,
+                              .height_px = 10,
+                              .rgb = std::vector<uint8_t>(360, 7),
+                              .alpha = std::vector<uint8_t>(120, 0)};
+  for (size_t y = 4; y < 10; ++y) {
+    for (size_t x = 5; x < 12; ++x) image.alpha[y * 12 + x] = 255;
+  }
+  const CroppedImage crop = crop_to_mask(image, 3);
+  EXPECT_EQ(crop.rect.x, 2u);
+  EXPECT_EQ(crop.rect.y, 1u);
+  EXPECT_EQ(crop.rect.x + crop.rect.width, 12u);
+  EXPECT_EQ(crop.rect.y + crop.rect.height, 10u);
+  EXPECT_EQ(crop.rgba.size(), size_t{10 * 9 * 4});
+  EXPECT_EQ(crop.rgba.back(), 255) << "the last pixel is the image's own corner";
+  const torch::Tensor target = target_of(crop, crop.rect);
+  EXPECT_EQ(target[3].sum().item<float>(), 42) << "every pixel of the mask is in it";
+  EXPECT_EQ(target[3][8][9].item<float>(), 1);
 }
 
 TEST(TrainingInput, IsRefusedWithOneClearLine) {
