@@ -105,7 +105,7 @@ TEST(BodyCommand, RefusesLayoutsInOneLineAndLeavesNothing) {
            Case{"--weight hands=nan", 1, "atlas: weight of hands: is not a positive number"},
            Case{"--weight hands=0.001", 1, "is too small to cover a texel of 32"},
            Case{"--coarsest-grid 4", 1, "do not fit with two cells of a grid of 4 between them"},
-           Case{"--coarsest-grid 32 --sheet none/atlas.png", 1,
+           Case{"--weight hands=5.5 --coarsest-grid 32 --sheet none/atlas.png", 1,
                 "--sheet: none/atlas.png: cannot create"},
            Case{"--coarsest-grid 2", 2, "--coarsest-grid"},
            Case{"--atlas other", 2, "--atlas"},
