@@ -36,8 +36,9 @@ if(FIGURINE_SANITIZE)
 endif()
 
 # Several files of a target compiled as one: headers are read, and templates made, once for all of
-# them. Half the time of a whole build, but one changed file compiles its neighbours as well. What a
-# device links stays apart (figurine_guard), and so do files with options of their own.
+# them. Five files with LibTorch took 23 CPU seconds apart and 7.4 as one. But one changed file
+# compiles its neighbours as well. What a device links stays apart (figurine_guard), and so do files
+# with options of their own.
 option(FIGURINE_UNITY "Compile several files as one where they allow it" OFF)
 set(CMAKE_UNITY_BUILD ${FIGURINE_UNITY})
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)

@@ -6,7 +6,7 @@ FIGURINE is a build of `figurine`. It draws the shipped avatar in the shipped wa
 pose, and then another one, STEP frames of the motion later, with the first pose's outputs of the
 network (`--network-below-px`) and with its own. Writes the PSNR of the one picture against the
 other, over the pixels that show the person, pooled over the starts, to OUTPUT
-(docs/results/stale_networks.json), and prints it; a minute.
+(docs/results/stale_networks.json), and prints it.
 """
 
 import json

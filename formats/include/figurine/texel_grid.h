@@ -45,7 +45,7 @@ TexelGrid make_texel_grid(const Body& body, uint32_t size);
 // tap takes its own cell. With G = T the texel itself with weight 1, and the three others 0: then
 // x[r0] is the value, without arithmetic.
 struct GridTaps {
-  uint32_t row[4];  // in [0,M); a tap of weight 0 repeats one of the others
+  uint32_t row[4];  // in [0,M); a tap of weight 0 names the texel's own cell
   float weight[4];  // >= 0, sum 1 within rounding
 };
 
