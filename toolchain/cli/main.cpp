@@ -8,10 +8,8 @@
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
-#include "toolchain/train/threads.h"
 
 int main(int argc, char** argv) {
-  figurine::train::wait_without_spinning(argv);
   CLI::App app{"figurine-train: bodies, captures, avatars and packages, offline"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "figurine-train " FIGURINE_VERSION);

@@ -1,10 +1,8 @@
 #include "toolchain/train/threads.h"
 
 #include <dlfcn.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "ports/host/cpus.h"
 
@@ -21,11 +19,5 @@ void use_threads(uint32_t count) {
 }
 
 uint32_t default_threads() { return std::min(ports::usable_cpus(), 16u); }
-
-void wait_without_spinning(char** arguments) {
-  if (std::getenv("OMP_WAIT_POLICY") != nullptr || std::getenv("GOMP_SPINCOUNT") != nullptr) return;
-  ::setenv("GOMP_SPINCOUNT", "1000", 0);  // looks, about 50 us
-  ::execv("/proc/self/exe", arguments);   // where that is not possible, threads spin
-}
 
 }  // namespace figurine::train

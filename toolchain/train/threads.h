@@ -1,4 +1,4 @@
-// How many threads LibTorch works with, and how they wait.
+// How many threads LibTorch works with.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,5 @@ void use_threads(uint32_t count);
 
 // As many as usable CPUs, 16 at most.
 uint32_t default_threads();
-
-// OpenMP's threads, LibTorch's among them, wait by spinning for milliseconds at every barrier,
-// which the thread that is waited for may need (docs/decisions/0024-threads.md). libgomp takes
-// another length from the environment alone, when it is loaded: sets that and starts the program
-// anew, once, unless the environment says how to wait already. First in main().
-void wait_without_spinning(char** arguments);
 
 }  // namespace figurine::train
