@@ -137,7 +137,7 @@ FlatProgress FlatTrainer::run() {
 
 void FlatTrainer::train_to_the_end() {
   train::Progress bar(options_.title, options_.quiet || !group_.leads());
-  const train::InterruptGuard interrupt;
+  train::InterruptGuard interrupt;
   double next_checkpoint = now_s() + options_.checkpoint_period_s;
   const double session_start = progress_.seconds;
   const uint64_t session_first = progress_.iteration;
@@ -150,6 +150,7 @@ void FlatTrainer::train_to_the_end() {
     if (stop || (options_.stop_after > 0 && iteration >= options_.stop_after)) {
       save("interrupted");
       group_.barrier();  // a rank that leaves may end the others: not before rank 0 has saved
+      if (group_.size() > 1 && !interrupt.requested()) interrupt.ignore_late();
       throw train::Interrupted(options_.run + ": stopped after " + std::to_string(iteration) +
                                " iterations; --resume goes on from here");
     }

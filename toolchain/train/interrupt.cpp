@@ -24,9 +24,13 @@ InterruptGuard::InterruptGuard() {
 
 InterruptGuard::~InterruptGuard() {
   sigaction(SIGINT, &previous_int, nullptr);
-  sigaction(SIGTERM, &previous_term, nullptr);
+  struct sigaction ignore{};
+  ignore.sa_handler = SIG_IGN;
+  sigaction(SIGTERM, ignore_late_ ? &ignore : &previous_term, nullptr);
 }
 
 bool InterruptGuard::requested() const { return interrupt_requested != 0; }
+
+void InterruptGuard::ignore_late() { ignore_late_ = true; }
 
 }  // namespace figurine::train

@@ -21,6 +21,13 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
   bool requested() const;
+  // For one of several ranks that stop together: SIGTERM is ignored from this object's end on,
+  // until the process ends. All ranks get the signal, but not at one time, and one for which it
+  // comes after another rank's has stopped and saved must still be able to say so.
+  void ignore_late();
+
+ private:
+  bool ignore_late_ = false;
 };
 
 }  // namespace figurine::train

@@ -34,6 +34,22 @@ std::map<size_t, JobResult> results_of(
   return results;
 }
 
+// A rank that stops with the others before its own signal has come: the signal does not end it.
+TEST(Interrupt, ThatComesAfterAnAgreedStopIsIgnored) {
+  for (const bool late : {false, true}) {
+    const std::map<size_t, JobResult> results = results_of(1, 1, [late](size_t) -> std::string {
+      signal(SIGTERM, SIG_DFL);  // not what the slots' parent does with it
+      {
+        InterruptGuard interrupt;
+        if (late) interrupt.ignore_late();
+      }
+      raise(SIGTERM);
+      return "said so";
+    });
+    EXPECT_EQ(results.at(0).done, late);
+  }
+}
+
 TEST(Slots, TellHowEveryJobEnded) {
   const std::map<size_t, JobResult> results = results_of(5, 2, [](size_t i) -> std::string {
     if (i == 1) throw InputError("b.fgn: is damaged");
