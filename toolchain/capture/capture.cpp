@@ -18,6 +18,7 @@
 #include "toolchain/capture/renderer.h"
 #include "toolchain/capture/sequence.h"
 #include "toolchain/dataset/dataset.h"
+#include "toolchain/dataset/skeleton_hash.h"
 #include "toolchain/error.h"
 #include "toolchain/random/counter.h"
 
@@ -123,6 +124,7 @@ Session prepare(const CaptureRequest& request, uint32_t identity, const Package&
                     .tool = request.tool,
                     .body_name = body.name,
                     .body_hash = format_hash(package.content_hash()),
+                    .skeleton_hash = dataset::skeleton_hash(body),
                     .sources = request.sources,
                     .folds = to_string(request.folds),
                     .limits = request.limits,

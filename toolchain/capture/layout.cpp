@@ -167,7 +167,8 @@ IdentityLayout::IdentityLayout(std::string directory, const IdentityRecord& reco
   about_["tool"] = record.tool;
   about_["identity"] = record.identity;
   about_["seed"] = record.seed;
-  about_["body"] = {{"name", record.body_name}, {"hash", record.body_hash}};
+  about_["body"] = {
+      {"name", record.body_name}, {"hash", record.body_hash}, {"skeleton", record.skeleton_hash}};
   about_["background"] = "black";
   about_["units"] =
       "metres, y up; rotations are quaternions wxyz relative to the parent, rest frames are "

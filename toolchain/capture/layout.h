@@ -21,7 +21,7 @@ struct IdentityRecord {
   uint32_t identity = 0;
   uint64_t seed = 0;
   std::string tool;
-  std::string body_name, body_hash;
+  std::string body_name, body_hash, skeleton_hash;
   std::vector<std::string> sources;
   std::string folds;  // to_string(FoldMode)
   WardrobeLimits limits;

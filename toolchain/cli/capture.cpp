@@ -17,7 +17,7 @@
 #include "toolchain/capture/capture.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
-#include "toolchain/dataset/jpeg.h"
+#include "toolchain/dataset/picture_file.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
 
@@ -26,7 +26,6 @@ namespace {
 
 // Debian's assimp-testmodels: a CMU clip.
 constexpr const char* kDefaultMotion = "/usr/share/assimp/models/BVH/01_01.bvh";
-constexpr int kSheetQuality = 88;
 // Close-ups are full of person, and cost more than twice as much a pixel of image: six at three
 // quarters of the size take less than half as long as the 24 others (docs/capture.md).
 constexpr uint32_t kDefaultBustViews = 6;
@@ -107,20 +106,12 @@ void write_sheet(const CaptureOptions& options) {
       people.size() == 1
           ? capture::contact_sheet(people[0], options.sheet_columns, options.sheet_rows)
           : capture::people_sheet(people, options.sheet_columns);
-  const std::string extension = std::filesystem::path(options.sheet).extension().string();
-  std::vector<std::byte> bytes;
-  if (extension == ".png") {
-    bytes = value_or_throw(ports::encode_png(sheet), options.sheet);
-  } else if (extension == ".jpg") {
-    bytes = dataset::encode_jpeg(sheet, kSheetQuality);
-  } else {
-    throw InputError("--sheet: '" + options.sheet + "' must end in .png or .jpg");
-  }
-  throw_if_error(ports::write_file_atomically(options.sheet, bytes), "--sheet");
+  dataset::write_picture(options.sheet, sheet);
 }
 
 void run_capture(CaptureOptions options) {
   capture::CaptureRequest& request = options.request;
+  if (!options.sheet.empty()) dataset::check_picture_name(options.sheet);
   parse_size(options.size, request.cameras);
   request.folds = parse_folds(options.folds);
   const ports::MappedFile file =

@@ -13,6 +13,7 @@
 #include "ports/media/png.h"
 #include "toolchain/dataset/jpeg.h"
 #include "toolchain/dataset/json_fields.h"
+#include "toolchain/dataset/skeleton_hash.h"
 #include "toolchain/error.h"
 
 namespace figurine::dataset {
@@ -310,7 +311,8 @@ class Dataset::Reading {
   }
 
   void check_body() const {
-    if (own_ && !options_.body_hash.empty() && options_.body_hash != set_.body_hash_) {
+    if (own_ && !options_.body_hash.empty() && options_.body_hash != set_.body_hash_ &&
+        !has_skeleton_of_body()) {
       about_["body"]["hash"].fail("captured with body " + set_.body_hash_ +
                                   ", but the given body is " + options_.body_hash);
     }
@@ -323,6 +325,12 @@ class Dataset::Reading {
       throw InputError(set_.directory_ + ": needs a body of 55 joints, the given one has " +
                        std::to_string(options_.body->joint_count()));
     }
+  }
+
+  // Captures of before the field stand for their own body alone.
+  bool has_skeleton_of_body() const {
+    return options_.body != nullptr && about_["body"].has("skeleton") &&
+           about_["body"]["skeleton"].text() == skeleton_hash(*options_.body);
   }
 
   void read_cameras() {

@@ -90,7 +90,7 @@ struct DatasetOptions {
   // turns Rh/Th into a pose. Must have 55 joints.
   const Body* body = nullptr;
   // Content hash of the body package (format_hash). If given, and the capture names its body, both
-  // must be equal.
+  // must be equal, or `body` have the skeleton that the capture names (skeleton_hash.h).
   std::string body_hash;
 };
 

@@ -202,6 +202,22 @@ TEST(Capture, ReaderFindsSplitsAndProvenance) {
             std::string::npos);
 }
 
+// Texels may lie elsewhere than in the body that was captured with: poses and shape mean the same.
+TEST(Capture, TrainsABodyOfTheSameSkeleton) {
+  const body::TexelBody finer = body::make_texel_body(body::make_mannequin(), 48);
+  Body body = finer.view();
+  const std::string hash(32, '0');
+  EXPECT_EQ(dataset::Dataset::open(finished(), {.body = &body, .body_hash = hash}).body_hash(),
+            format_hash(mannequin().content_hash()));
+  std::vector<float> joints(body.joint_position_m.begin(), body.joint_position_m.end());
+  joints[7] += 1e-4f;
+  body.joint_position_m = joints;
+  EXPECT_NE(input_error([&] {
+              dataset::Dataset::open(finished(), {.body = &body, .body_hash = hash});
+            }).find("captured with body"),
+            std::string::npos);
+}
+
 TEST(Capture, BustCamerasStandBesideTheOthersAndChangeNothingForThem) {
   const TemporaryFolder folder;
   CaptureRequest request = small_request(folder.path());
