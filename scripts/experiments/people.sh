@@ -1,5 +1,5 @@
-# Sourced by line.sh and quantization.sh, in the checkout and with $folder set: tools.sh, the body,
-# the motions, a person's capture.
+# Sourced by line.sh, quantization.sh and sharp.sh, in the checkout and with $folder set: tools.sh,
+# the body (with $body_options, if there are any), the motions, a person's capture.
 #
 # People walk (four walks and an endless one from CMU 01_03) and jump (01_01), turned through 360
 # degrees. What is in $folder already stays.
@@ -8,7 +8,7 @@
 mkdir -p "$folder/runs"
 
 body=$folder/body.fgn
-[ -e "$body" ] || { step "body"; train body --makehuman --uv 128 -o "$body"; }
+[ -e "$body" ] || { step "body"; train body --makehuman --uv 128 "${body_options[@]}" -o "$body"; }
 
 motions=()
 motion() {  # NAME CLIP OPTIONS...
@@ -24,11 +24,11 @@ motion walk_3 01_03.bvh --start 2241 --frames 55
 motion walk_4 01_03.bvh --start 3329 --frames 55
 motion jump 01_01.bvh --frames 180
 
-capture_person() {  # FOLDER SEED: leaves the folder of the person's images in $identity
+capture_person() {  # FOLDER SEED OPTIONS...: leaves the folder of the person's images in $identity
   [ -e "$1/.done" ] || {
     step "capture of person $2"
     train capture --body "$body" --identities 1 --seed "$2" --frames 119 "${motions[@]}" --resume \
-      -o "$1"
+      -o "$1" "${@:3}"
     touch "$1/.done"
   }
   identity=$1/$(cd "$1" && ls -d */ | head -n 1 | tr -d /)

@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 
 #include "ports/host/files.h"
-#include "ports/media/png.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
+#include "toolchain/dataset/picture_file.h"
 #include "toolchain/error.h"
 #include "toolchain/json_number.h"
 #include "toolchain/pictures/contact_sheet.h"
@@ -37,6 +37,7 @@ struct EvaluateArguments {
   quantize::FineTuneOptions fine_tune;
   bool no_qat = false;
   std::vector<std::string> runs, packages;  // of quantization and population
+  std::vector<std::string> beside;          // of the contact sheet
   std::string precision = "f32", sheet, output, package;
 };
 
@@ -84,14 +85,20 @@ void print_parts(const nlohmann::json& parts) {
 }
 
 void run_reconstruction(const EvaluateArguments& arguments) {
+  if (!arguments.sheet.empty()) dataset::check_picture_name(arguments.sheet);
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
+  std::vector<train::TrainedAvatar> beside;
+  for (const std::string& run : arguments.beside) {
+    beside.push_back(train::TrainedAvatar::open(
+        {.run = run, .data = arguments.open.data, .threads = arguments.open.threads}));
+  }
   nlohmann::json report = report_head(arguments, avatar);
   report.update(reconstruction::evaluate_reconstruction(avatar, arguments.reconstruction));
   if (!arguments.sheet.empty()) {
-    const ports::ImageU8 sheet = pictures::make_contact_sheet(avatar, {});
-    throw_if_error(ports::write_file_atomically(
-                       arguments.sheet, value_or_throw(ports::encode_png(sheet), arguments.sheet)),
-                   "cannot save");
+    pictures::Avatars shown;
+    for (train::TrainedAvatar& other : beside) shown.push_back(&other);
+    shown.push_back(&avatar);
+    dataset::write_picture(arguments.sheet, pictures::make_contact_sheet(shown, {}));
     report["contact_sheet"] = arguments.sheet;
   }
   train::write_json(train::RunDirectory{arguments.open.run}.evaluation(), report);
@@ -231,7 +238,10 @@ void add_evaluate_command(CLI::App& app) {
       command->add_subcommand("reconstruction", "Held-out cameras and poses against the truth");
   add_run_options(reconstruction, arguments);
   reconstruction->add_option("--sheet", arguments->sheet,
-                             "Contact sheet to write, PNG: truth left, prediction right");
+                             "Contact sheet to write, .png or .jpg: truth left, prediction right");
+  reconstruction->add_option(
+      "--beside", arguments->beside,
+      "Runs of the same capture whose pictures the sheet shows between truth and prediction");
   reconstruction
       ->add_option("--view-frame-step", arguments->reconstruction.view_frame_step,
                    "Look at every n-th training pose only (default 1: all)")

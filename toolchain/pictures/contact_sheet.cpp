@@ -104,24 +104,27 @@ std::vector<std::pair<size_t, size_t>> choose_pictures(const train::TrainedAvata
   return chosen;
 }
 
-// One picture beside the truth, and the boxes of it that are shown.
-struct Pair {
-  Picture truth, prediction;
+// The true picture and every avatar's, and the boxes of them that are shown.
+struct Compared {
+  std::vector<Picture> pictures;  // truth first
   Box person, face, hand;
 };
 
-Pair make_pair(train::TrainedAvatar& avatar, const PosedFrame& posed, size_t frame, size_t camera) {
-  const Camera& view = avatar.data().cameras()[camera].camera;
-  Pair pair{.truth = true_picture(avatar.data(), frame, camera),
-            .prediction = render_picture(avatar, posed, view),
-            .person = {},
-            .face = {},
-            .hand = {}};
-  pair.person = bounding_box(pair.truth);
-  if (pair.person.empty()) pair.person = {0, 0, int(view.width_px), int(view.height_px)};
-  pair.face = projected_box(avatar.model(), posed.posed, view, head_joints(), 0);
-  pair.hand = projected_box(avatar.model(), posed.posed, view, left_hand_joints(), 0);
-  return pair;
+// One frame as every avatar poses it.
+using PosedFrames = std::vector<PosedFrame>;
+
+Compared compare(const Avatars& avatars, const PosedFrames& posed, size_t frame, size_t camera) {
+  train::TrainedAvatar& first = *avatars.front();
+  const Camera& view = first.data().cameras()[camera].camera;
+  Compared result;
+  result.pictures.push_back(true_picture(first.data(), frame, camera));
+  for (size_t i = 0; i < avatars.size(); ++i)
+    result.pictures.push_back(render_picture(*avatars[i], posed[i], view));
+  result.person = bounding_box(result.pictures.front());
+  if (result.person.empty()) result.person = {0, 0, int(view.width_px), int(view.height_px)};
+  result.face = projected_box(first.model(), posed.front().posed, view, head_joints(), 0);
+  result.hand = projected_box(first.model(), posed.front().posed, view, left_hand_joints(), 0);
+  return result;
 }
 
 // The camera of head and shoulders that sees most of the face, of those whose picture of this frame
@@ -141,37 +144,45 @@ std::optional<size_t> bust_camera(const train::TrainedAvatar& avatar, size_t fra
   return best;
 }
 
-// What stands in one column of the sheet: the same pose as a whole, from near by, and in detail.
-struct Column {
-  Pair body;
-  std::optional<Pair> bust;
+// What stands in a group of columns of the sheet: the same pose as a whole, from near by, and in
+// detail.
+struct Columns {
+  Compared body;
+  std::optional<Compared> bust;
 };
+
+Columns make_columns(const Avatars& avatars, size_t frame, size_t camera) {
+  PosedFrames posed;
+  for (train::TrainedAvatar* const avatar : avatars) posed.push_back(pose_frame(*avatar, frame));
+  Columns columns{compare(avatars, posed, frame, camera), {}};
+  if (const std::optional<size_t> near = bust_camera(*avatars.front(), frame))
+    columns.bust = compare(avatars, posed, frame, *near);
+  return columns;
+}
 
 struct Rows {
   uint32_t tile_width, detail_width;
   bool busts;  // there is a row of them, of square tiles
 };
 
-void paste_column(const Column& column, int side, const ContactSheetOptions& options,
+void paste_column(const Columns& columns, size_t column, const ContactSheetOptions& options,
                   const Rows& rows, uint32_t x, ports::ImageU8& sheet) {
-  const auto picture = [&](const Pair& pair) -> const Picture& {
-    return side == 0 ? pair.truth : pair.prediction;
-  };
+  const Compared& body = columns.body;
   const float aspect = float(rows.tile_width) / float(options.person_height_px);
-  paste(picture(column.body), framed(column.body.person, aspect, kPersonMargin), sheet, x, kGap_px,
+  paste(body.pictures[column], framed(body.person, aspect, kPersonMargin), sheet, x, kGap_px,
         rows.tile_width, options.person_height_px);
   uint32_t y = options.person_height_px + 2 * kGap_px;
   if (rows.busts) {
-    if (column.bust && !column.bust->face.empty()) {
-      paste(picture(*column.bust), framed(column.bust->face, 1, kBustMargin), sheet, x, y,
+    if (columns.bust && !columns.bust->face.empty()) {
+      paste(columns.bust->pictures[column], framed(columns.bust->face, 1, kBustMargin), sheet, x, y,
             rows.tile_width, rows.tile_width);
     }
     y += rows.tile_width + kGap_px;
   }
-  for (const Box& detail : {column.body.face, column.body.hand}) {
+  for (const Box& detail : {body.face, body.hand}) {
     const float detail_aspect = float(rows.detail_width) / float(options.detail_height_px);
     if (!detail.empty()) {
-      paste(picture(column.body), framed(detail, detail_aspect, kDetailMargin), sheet,
+      paste(body.pictures[column], framed(detail, detail_aspect, kDetailMargin), sheet,
             x + (rows.tile_width - rows.detail_width) / 2, y, rows.detail_width,
             options.detail_height_px);
     }
@@ -179,36 +190,43 @@ void paste_column(const Column& column, int side, const ContactSheetOptions& opt
   }
 }
 
+void check_avatars(const Avatars& avatars) {
+  if (avatars.empty()) throw InputError("a contact sheet needs an avatar");
+  const dataset::Dataset& data = avatars.front()->data();
+  for (const train::TrainedAvatar* const avatar : avatars) {
+    if (avatar->data().directory() != data.directory()) {
+      throw InputError(avatar->data().directory() + ": a contact sheet shows one capture, " +
+                       data.directory() + " is another");
+    }
+  }
+}
+
 }  // namespace
 
-ports::ImageU8 make_contact_sheet(train::TrainedAvatar& avatar,
-                                  const ContactSheetOptions& options) {
-  std::vector<Column> columns;
+ports::ImageU8 make_contact_sheet(const Avatars& avatars, const ContactSheetOptions& options) {
+  check_avatars(avatars);
+  std::vector<Columns> poses;
   float aspect = 0.3f;  // width over height of the widest person
   bool busts = false;
-  for (const auto& [frame, camera] : choose_pictures(avatar, options.pairs)) {
-    const PosedFrame posed = pose_frame(avatar, frame);
-    Column column{make_pair(avatar, posed, frame, camera), {}};
-    if (const std::optional<size_t> near = bust_camera(avatar, frame))
-      column.bust = make_pair(avatar, posed, frame, *near);
-    busts = busts || column.bust.has_value();
-    const Box& person = column.body.person;
+  for (const auto& [frame, camera] : choose_pictures(*avatars.front(), options.poses)) {
+    poses.push_back(make_columns(avatars, frame, camera));
+    busts = busts || poses.back().bust.has_value();
+    const Box& person = poses.back().body.person;
     aspect = std::max(aspect, float(person.x1 - person.x0) / float(person.y1 - person.y0));
-    columns.push_back(std::move(column));
   }
   const auto tile_width =
       static_cast<uint32_t>(std::ceil(aspect * float(options.person_height_px)));
   const Rows rows{tile_width, std::min(tile_width, options.detail_height_px), busts};
-  const uint32_t pair_width = 2 * tile_width + 2 * kGap_px;
+  const auto count = static_cast<uint32_t>(avatars.size() + 1);
+  const uint32_t pose_width = count * (tile_width + kGap_px / 2) + kGap_px;
   const uint32_t height = options.person_height_px + 2 * options.detail_height_px + 4 * kGap_px +
                           (busts ? tile_width + kGap_px : 0);
-  ports::ImageU8 sheet(pair_width * uint32_t(columns.size()) + kGap_px, height, 3);
+  ports::ImageU8 sheet(pose_width * uint32_t(poses.size()) + kGap_px, height, 3);
   std::fill(sheet.pixels.begin(), sheet.pixels.end(), uint8_t{255});
-  for (uint32_t i = 0; i < columns.size(); ++i) {
-    for (int side = 0; side < 2; ++side) {
-      const uint32_t x =
-          kGap_px + i * pair_width + static_cast<uint32_t>(side) * (tile_width + kGap_px / 2);
-      paste_column(columns[i], side, options, rows, x, sheet);
+  for (uint32_t i = 0; i < poses.size(); ++i) {
+    for (uint32_t column = 0; column < count; ++column) {
+      const uint32_t x = kGap_px + i * pose_width + column * (tile_width + kGap_px / 2);
+      paste_column(poses[i], column, options, rows, x, sheet);
     }
   }
   return sheet;

@@ -175,9 +175,10 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
                            {"log", training_log(state.scratch_run(name))}};
     row["log"] = training_log(run);
   }
-  save(state.sheet(name), dataset::encode_jpeg(pictures::make_contact_sheet(
-                                                   avatar, {.pairs = 3, .person_height_px = 320}),
-                                               kSheetQuality));
+  save(state.sheet(name),
+       dataset::encode_jpeg(
+           pictures::make_contact_sheet({&avatar}, {.poses = 3, .person_height_px = 320}),
+           kSheetQuality));
   save(state.member(name), package);
   train::write_json(state.row(name), row);
   clean_up();

@@ -101,10 +101,32 @@ TEST(Evaluation, TellsCloseUpsFromWholePeople) {
   }
 }
 
+TEST(ContactSheet, ShowsSeveralAvatarsBesideTheTruth) {
+  TrainedAvatar avatar = TrainedAvatar::open({.run = trained_run()});
+  const pictures::ContactSheetOptions small{
+      .poses = 1, .person_height_px = 60, .detail_height_px = 20};
+  const ports::ImageU8 one = pictures::make_contact_sheet({&avatar}, small),
+                       two = pictures::make_contact_sheet({&avatar, &avatar}, small);
+  const uint32_t tile = (one.width_px - 12) / 2;
+  ASSERT_EQ(two.width_px, 3 * (tile + 2) + 8);
+  ASSERT_EQ(two.height_px, one.height_px);
+  for (uint32_t y = 0; y < one.height_px; ++y) {
+    for (uint32_t x = 0; x < 2 * (tile + 2); ++x)
+      ASSERT_TRUE(
+          std::ranges::equal(std::span(two.at(4 + x, y), 3), std::span(one.at(4 + x, y), 3)))
+          << x << " " << y;
+    for (uint32_t x = 0; x < tile; ++x)
+      ASSERT_TRUE(std::ranges::equal(std::span(two.at(4 + 2 * (tile + 2) + x, y), 3),
+                                     std::span(one.at(4 + tile + 2 + x, y), 3)))
+          << x << " " << y;
+  }
+  EXPECT_THROW(pictures::make_contact_sheet({}, {}), InputError);
+}
+
 TEST(ContactSheet, ShowsHeadAndShouldersBelowWholePeople) {
   TrainedAvatar avatar = TrainedAvatar::open({.run = trained_run()});
   const ports::ImageU8 sheet = pictures::make_contact_sheet(
-      avatar, {.pairs = 1, .person_height_px = 60, .detail_height_px = 20});
+      {&avatar}, {.poses = 1, .person_height_px = 60, .detail_height_px = 20});
   // One pair of square tiles between the rows of 60 and of twice 20, and gaps of 4.
   const uint32_t tile = (sheet.width_px - 12) / 2;
   EXPECT_EQ(sheet.height_px, 60 + tile + 2 * 20 + 5 * 4);

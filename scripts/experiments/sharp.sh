@@ -1,0 +1,111 @@
+#!/usr/bin/env bash
+# What static values, the network's size, the atlas and the filters are worth: two people, the
+# shipped one and one in pinstripes, each trained for ten minutes by today's preset and by the one
+# before it, and a row a change. Writes docs/results/stage1.json and docs/sharp.jpg.
+#
+#   scripts/experiments/sharp.sh [FOLDER]
+#
+# FOLDER (default out/sharp) keeps every step: run it again and it goes on where it stopped. The
+# runs that train for minutes take both cores, one after the other; the rows train for iterations,
+# two at a time on one core each, which a busy machine cannot change.
+#
+# Environment: ITERATIONS (1000) of the rows, MINUTES (10) of the others, SEED (1) of the shipped
+# person, STRIPES_SEED (1) of the other, and ROWS (all), a list of names to limit training to. On
+# two quiet cores about three hours.
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
+cd "$figurine_checkout"
+
+folder=${1:-out/sharp} iterations=${ITERATIONS:-1000} minutes=${MINUTES:-10}
+programs=(figurine)
+body_options=(--atlas weighted --weight hands=5.5 --weight head=5.5)
+. scripts/experiments/people.sh
+
+other_body() {  # NAME OPTIONS...: another layout of texels over the same skeleton
+  [ -e "$folder/$1.fgn" ] || train body --makehuman -o "$folder/$1.fgn" "${@:2}"
+}
+step "bodies"
+other_body body_mesh_layout --uv 128
+other_body body_256 --uv 256 "${body_options[@]}"
+
+capture_person "$folder/capture" "${SEED:-1}"
+person=$identity
+capture_person "$folder/stripes" "${STRIPES_SEED:-1}" --outfit male_casualsuit03
+stripes=$identity
+
+wanted() { case " ${ROWS:-$1} " in *" $1 "*) ;; *) return 1 ;; esac; }
+
+# NAME DATA BODY OPTIONS...: trains and evaluates what is not there yet.
+row() {
+  local name=$1 data=$2 row_body=$folder/$3.fgn run=$folder/runs/$1
+  shift 3
+  if [ -e "$run/run.json" ]; then
+    train avatar --data "$data" --body "$row_body" --resume --quiet -o "$run"
+  else
+    train avatar --data "$data" --body "$row_body" --quiet -o "$run" "$@"
+  fi
+  [ "$run/evaluation.json" -nt "$run/weights.safetensors" ] ||
+    train evaluate reconstruction --run "$run" --threads 1 > /dev/null
+  step "$name is there"
+}
+
+# Trained by the clock, on all cores. The preset before: no static values, a network for all texels
+# where the mesh's own layout has them.
+before=(--static-grids none --network-size 128)
+fast=(--minutes "$minutes" --poses 2 --views-per-pose 2)
+timed="
+shipped|$person|body|
+before|$person|body_mesh_layout|${before[*]}
+stripes|$stripes|body|
+stripes_before|$stripes|body_mesh_layout|${before[*]}
+stripes_fine|$stripes|body_256|--uv 256 --network-size 64 --static-grids colour:T,rest:T/2
+"
+while IFS='|' read -r name data row_body options; do
+  # shellcheck disable=SC2086  # options are words
+  [ -z "$name" ] || ! wanted "$name" || row "$name" "$data" "$row_body" "${fast[@]}" $options
+done <<< "$timed"
+
+# name | body | what is changed of the preset
+rows="
+chosen|body|
+frozen_pose|body|--freeze-pose
+static_none|body|--static-grids none
+static_none_network_128|body|--static-grids none --network-size 128
+static_256|body_256|--uv 256 --network-size 64 --static-grids all:T
+static_colour_256|body_256|--uv 256 --network-size 64 --static-grids colour:T,rest:T/2
+static_colour_only|body|--static-grids colour:T
+static_half|body|--static-grids all:T/2
+static_sum|body|--static-colour sum
+static_learning_rate_5e-3|body|--static-learning-rate 5e-3
+static_penalty_1e-2|body|--static-penalty 1e-2
+network_none|body|--network none
+network_128|body|--network-size 128
+network_32|body|--network-size 32
+channels_24|body|--channels 24
+channels_16|body|--channels 16
+mesh_layout|body_mesh_layout|
+"
+while IFS='|' read -r name row_body options; do
+  [ -n "$name" ] && wanted "$name" || continue
+  while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n; done
+  # shellcheck disable=SC2086  # options are words
+  row "$name" "$person" "$row_body" --iterations "$iterations" --views-per-pose 2 --threads 1 \
+    $options &
+done <<< "$rows"
+while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done
+
+shipped=$folder/runs/shipped
+if [ -e "$shipped/evaluation.json" ]; then
+  for run in shipped before; do
+    [ ! -e "$folder/runs/$run/evaluation.json" ] ||
+      train pack "$folder/runs/$run" --precision f32,q8 --golden -o "$folder/$run.fgn"
+  done
+  train pack "$shipped" --precision q8 -o "$folder/shipped_q8.fgn"
+  train evaluate parity --run "$shipped" --package "$folder/shipped.fgn" \
+    --precision q8 -o "$folder/parity_q8.json"
+  train evaluate reconstruction --run "$shipped" --beside "$folder/runs/before" \
+    --sheet docs/sharp.jpg > /dev/null
+fi
+step "docs/results/stage1.json"
+scripts/run python3 scripts/experiments/sharp_report.py "$folder" docs/results/stage1.json \
+  "$build/samples/figurine/figurine" "scripts/experiments/sharp.sh"
