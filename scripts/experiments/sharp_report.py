@@ -20,6 +20,7 @@ from results import read
 FIGURES = (
     "psnr_db",
     "head_psnr_db",
+    "hand_psnr_db",
     "highpass_ratio",
     "highpass_correlation",
     "filled_share",
@@ -29,7 +30,14 @@ FIGURES = (
     "bust_highpass_correlation",
     "bust_filled_share",
 )
-FROM_REPORT = ("iterations", "train_seconds", "iterations_per_second", "parts")
+FROM_REPORT = (
+    "iterations",
+    "train_seconds",
+    "iterations_per_second",
+    "parts",
+    "rectified_channels",
+    "idle_channels",
+)
 RUNS = 5  # of figurine bench a package, by turns
 
 

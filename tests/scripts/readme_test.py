@@ -17,7 +17,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TOOLS = {}
-SMALLER = [(r"--preset edge", "--preset nano"), (r"--uv 128", "--uv 32"),
+SMALLER = [(r"--preset edge", "--preset nano"), (r"--(uv|network-size) 128", r"--\1 32"),
            (r"--minutes \d+", "--iterations 20"), (r"--size 512x512", "--size 64x64"),
            (r"(figurine-train capture.*)", r"\1 --views 6 --frames 10 --size 64x64"),
            (r"(figurine-train body.*)", r"\1 --shape-samples 30"),

@@ -51,9 +51,16 @@ Enum choose(const std::string& text, std::initializer_list<Enum> values) {
 // Network and static values.
 void overlay_parts(const AvatarArguments& arguments, train::TrainSettings& settings) {
   using model::StaticColour;
+  const bool other_side = arguments.uv && *arguments.uv != train::texel_side(settings);
   if (arguments.uv) settings.uv_size = *arguments.uv;
   if (arguments.network) settings.network = *arguments.network != "none";
-  if (arguments.network_size) settings.network_size = *arguments.network_size;
+  if (arguments.network_size) {
+    settings.network_size = *arguments.network_size;
+  } else if (!settings.network) {
+    settings.network_size = 0;
+  } else if (other_side && settings.network_size > 0) {
+    settings.network_size = settings.uv_size / train::find_preset(settings.preset).network_step;
+  }
   if (arguments.channels) settings.channels = *arguments.channels;
   if (arguments.static_grids)
     settings.static_grids = train::parse_static_grids(*arguments.static_grids, "--static-grids");
@@ -202,16 +209,19 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
                    "none: static values alone, whatever the pose (default unet)")
       ->check(CLI::IsMember({"unet", "none"}));
   command
-      ->add_option("--network-size", arguments.network_size,
-                   "Texels a side that the network sees: 1, 1/2, 1/4 or 1/8 of the body's (default "
-                   "all)")
+      ->add_option(
+          "--network-size", arguments.network_size,
+          "Texels a side that the network sees: 1, 1/2, 1/4 or 1/8 of the body's (default: "
+          "the preset's share: edge half, others all)")
       ->check(CLI::Range(8, 1024));
   command->add_option("--channels", arguments.channels, "Of the network (default: the preset's)")
       ->check(CLI::Range(1, 2048));
-  command->add_option("--static-grids", arguments.static_grids,
-                      "What every texel owns whatever the pose, by groups of channels and their "
-                      "resolution: colour:T,rest:T/2 (all, colour, rest, geometry, offset, scale, "
-                      "rotation, opacity; T, T/2, T/4, T/8), or none (default)");
+  command->add_option(
+      "--static-grids", arguments.static_grids,
+      "What every texel owns whatever the pose, by groups of channels and their "
+      "resolution: colour:T,rest:T/2 (all, colour, rest, geometry, offset, scale, "
+      "rotation, opacity; T, T/2, T/4, T/8), or none (default: the preset's: edge all:T, "
+      "others none)");
   command
       ->add_option("--static-colour", arguments.static_colour,
                    "Static colours times the network's (gain, default) or added to them (sum: an "

@@ -104,6 +104,11 @@ void run_reconstruction(const EvaluateArguments& arguments) {
   train::write_json(train::RunDirectory{arguments.open.run}.evaluation(), report);
   if (!arguments.output.empty()) train::write_json(arguments.output, report);
   print_parts(report.at("parts"));
+  if (report.contains("idle_channels")) {
+    std::printf("%u of %u rectified channels off in every pose\n",
+                report.at("idle_channels").get<unsigned>(),
+                report.at("rectified_channels").get<unsigned>());
+  }
   print_group("held-out views", report.at("held_out_views"));
   print_group("held-out poses", report.at("held_out_poses"));
   print_group("  interleaved", report.at("held_out_poses_interleaved"));

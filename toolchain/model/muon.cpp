@@ -11,6 +11,10 @@ namespace {
 constexpr double kA = 3.4445, kB = -4.7750, kC = 2.0315;
 constexpr int kIterations = 5;
 
+// Below it the inverse of the norm may be no float: a momentum decays that far where a layer has
+// had no gradient for a thousand steps.
+constexpr double kSmallNorm = 1e-30;
+
 }  // namespace
 
 torch::Tensor orthogonalised(const torch::Tensor& matrix) {
@@ -26,6 +30,7 @@ torch::Tensor orthogonalised(const torch::Tensor& matrix) {
     // Polynomials of one symmetric matrix commute: step G step.
     if (i + 1 < kIterations) gram = at::mm(step, at::mm(gram, step));
   }
+  if (norm < kSmallNorm) return at::mm(product, wide.div(norm)).to(torch::kFloat);
   return at::mm(product.div_(norm).to(torch::kFloat), matrix);
 }
 

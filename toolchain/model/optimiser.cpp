@@ -29,6 +29,10 @@ bool all_finite(const float* values, int64_t count) {
   return std::all_of(std::begin(probe), std::end(probe), [](float value) { return value == 0; });
 }
 
+bool is_zero(const float* values, int64_t count) {
+  return std::all_of(values, values + count, [](float value) { return value == 0; });
+}
+
 }  // namespace
 
 double squared_norm(const torch::Tensor& gradients) {
@@ -115,6 +119,9 @@ void Optimiser::step_muon(const ParameterGroup& group, torch::Tensor& weights,
               rest = static_cast<float>(1 - options_.momentum);
   const torch::Tensor gradient = matrix(gradients), mean = matrix(first_moment);
   mean.mul_(momentum).add_(gradient, rest);
+  // However short the momentum, its step has the same length: a layer whose units are all off would
+  // go on in the direction of its last gradient until its weights are no numbers.
+  if (is_zero(gradients.const_data_ptr<float>() + group.begin, count)) return;
   const torch::Tensor direction = orthogonalised(at::add(mean * momentum, gradient, rest));
   // An orthogonal [rows, columns] matrix has elements of RMS 1 / sqrt(max(rows, columns)).
   const double size =

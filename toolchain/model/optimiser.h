@@ -34,7 +34,7 @@ class Optimiser {
   Optimiser(std::vector<ParameterGroup> groups, const OptimiserOptions& options);
 
   // weights and gradients: [P] contiguous floats. A gradient that is not finite leaves everything
-  // as it was and returns false.
+  // as it was and returns false. A matrix of Muon's without any gradient stays where it is.
   bool step(torch::Tensor& weights, const torch::Tensor& gradients, double learning_rate);
 
   // State for checkpoints: moments [P] and the number of steps. Muon's groups keep their momentum

@@ -111,7 +111,7 @@ InitialWeightsRecipe read_initial(const JsonField& json) {
 train::TrainSettings read_training(const JsonField& json, const std::string& preset) {
   allow_only(json, {"iterations", "views_per_pose", "poses", "learning_rate", "seed",
                     "spacing_scale", "standoff_weight", "precision"});
-  train::TrainSettings settings = train::preset_settings(preset);
+  train::TrainSettings settings = train::network_alone(train::preset_settings(preset));
   settings.schedule.budget = {.iterations = whole(json["iterations"], 1, 1u << 30), .seconds = 0};
   if (json.has("views_per_pose")) settings.views_per_pose = count(json["views_per_pose"], 1, 64);
   if (json.has("poses")) settings.poses_per_iteration = count(json["poses"], 1, 64);

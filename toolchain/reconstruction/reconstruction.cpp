@@ -8,6 +8,7 @@
 #include "toolchain/error.h"
 #include "toolchain/json_number.h"
 #include "toolchain/pictures/avatar_pictures.h"
+#include "toolchain/reconstruction/idle_channels.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
 
@@ -27,6 +28,7 @@ using measure::Outline;
 using measure::Picture;
 using measure::SquaredError;
 using pictures::head_joints;
+using pictures::left_hand_joints;
 using pictures::pose_frame;
 using pictures::PosedFrame;
 using pictures::projected_box;
@@ -40,14 +42,15 @@ namespace {
 constexpr float kHeadEnlarge = 0.15f;
 
 struct Group {
-  SquaredError foreground, crop, head;
+  SquaredError foreground, crop, head, hand;
   HighPass sharpness, head_sharpness;
   Outline outline;
   Filled filled;
   FlatColour flat;
   uint64_t images = 0;
 
-  void add(const Picture& prediction, const Picture& truth, const Box& head_box) {
+  void add(const Picture& prediction, const Picture& truth, const Box& head_box,
+           const Box& hand_box) {
     foreground.add(foreground_error(prediction, truth));
     crop.add(crop_error(prediction, truth));
     sharpness.add(high_pass(prediction, truth));
@@ -55,6 +58,7 @@ struct Group {
       head.add(foreground_error(prediction, truth, head_box));
       head_sharpness.add(high_pass(prediction, truth, head_box));
     }
+    if (!hand_box.empty()) hand.add(foreground_error(prediction, truth, hand_box));
     outline.add(compare_outlines(prediction, truth));
     filled.add(count_filled(prediction, truth));
     flat.add(truth);
@@ -69,6 +73,7 @@ nlohmann::json to_json(const Group& group) {
           {"flat_psnr_db", finite(group.flat.error().psnr_db())},
           {"crop_psnr_db", finite(group.crop.psnr_db())},
           {"head_psnr_db", finite(group.head.psnr_db())},
+          {"hand_psnr_db", finite(group.hand.psnr_db())},
           {"highpass_ratio", finite(group.sharpness.ratio())},
           {"highpass_correlation", finite(group.sharpness.correlation())},
           {"head_highpass_ratio", finite(group.head_sharpness.ratio())},
@@ -128,6 +133,8 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
   train::Progress progress("evaluate", options.quiet);
   const train::InterruptGuard interrupt;
   size_t training_frames = 0;
+  std::optional<IdleChannels> idle;
+  if (avatar.model().has_network()) idle.emplace(avatar.model().unet());
   for (size_t frame = 0; frame < frames; ++frame) {
     const dataset::FrameSplit split = data.frames()[frame].split;
     if (split == dataset::FrameSplit::kTrain && training_frames++ % options.view_frame_step != 0)
@@ -137,15 +144,19 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
       const dataset::Role role = data.role(frame, camera);
       if (role == dataset::Role::kTrain) continue;
       if (interrupt.requested()) throw train::Interrupted("evaluate: stopped; nothing was written");
-      if (!posed) posed = pose_frame(avatar, frame);
+      if (!posed) {
+        posed = pose_frame(avatar, frame);
+        if (idle) idle->look_at(posed->posed.input);
+      }
       const Camera& view = data.cameras()[camera].camera;
       const dataset::Framing framing = data.cameras()[camera].framing;
       const Picture prediction = render_picture(avatar, *posed, view);
       const Picture truth = true_picture(data, frame, camera);
       const Box head_box =
           projected_box(avatar.model(), posed->posed, view, head_joints(), kHeadEnlarge);
+      const Box hand_box = projected_box(avatar.model(), posed->posed, view, left_hand_joints(), 0);
       for (const std::string& group : groups_of(role))
-        groups[group].of(framing).add(prediction, truth, head_box);
+        groups[group].of(framing).add(prediction, truth, head_box, hand_box);
       if (split == dataset::FrameSplit::kBlock && framing == dataset::Framing::kBody) {
         std::optional<Before>& last = before[camera];
         if (last && last->frame + 1 == frame)
@@ -164,12 +175,17 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
     report[name] = to_json(groups[name]);
   }
   report["parts"] = train::describe_parts(avatar.model());
+  if (idle) {
+    report["rectified_channels"] = idle->channels();
+    report["idle_channels"] = idle->idle();
+  }
   report["difference_psnr_db"] = finite(difference.psnr_db());
   report["definition"] =
       "PSNR over pixels whose true alpha exceeds 0.5, on stored sRGB values, over mid-grey, pooled "
       "MSE; flat: one colour with a perfect "
       "mask; crop: bounding box "
-      "of the mask, over black; head: projected box of the head's texels, 15 % larger; high-pass: "
+      "of the mask, over black; head: projected box of the head's texels, 15 % larger; hand: of "
+      "the left hand's; high-pass: "
       "energy of (picture - 3x3 mean) "
       "inside the mask, "
       "prediction over truth, and its correlation with the truth's; filled: alpha of at least 0.98 "

@@ -69,6 +69,16 @@ TrainSettings preset_settings(const std::string& name) {
   settings.preset = name;
   settings.fourier_octaves = preset.fourier_octaves;
   settings.decoding.sh_degree = preset.sh_degree;
+  if (preset.network_step > 1) settings.network_size = preset.uv_size / preset.network_step;
+  settings.schedule.peak = preset.learning_rate;
+  settings.static_grids = parse_static_grids(preset.static_grids, name);
+  return settings;
+}
+
+TrainSettings network_alone(TrainSettings settings) {
+  settings.network_size = 0;
+  settings.static_grids.clear();
+  settings.schedule.peak = TrainSettings{}.schedule.peak;
   return settings;
 }
 

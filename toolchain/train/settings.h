@@ -20,10 +20,14 @@ struct Preset {
   uint32_t channels;         // C
   uint32_t sh_degree;        // d
   uint32_t fourier_octaves;  // constant input channels: 4 per octave; 0: as in the paper
+  uint32_t network_step;     // T / T_n
+  double learning_rate;      // of the network
+  const char* static_grids;  // as parse_static_grids reads it
 };
 
-inline constexpr std::array<Preset, 3> kPresets{
-    {{"nano", 32, 8, 0, 5}, {"edge", 128, 32, 0, 5}, {"paper", 256, 64, 3, 0}}};
+inline constexpr std::array<Preset, 3> kPresets{{{"nano", 32, 8, 0, 5, 1, 2e-3, "none"},
+                                                 {"edge", 128, 32, 0, 5, 2, 1e-3, "all:T"},
+                                                 {"paper", 256, 64, 3, 0, 1, 2e-3, "none"}}};
 
 // Throws InputError naming the known ones.
 const Preset& find_preset(const std::string& name);
@@ -62,7 +66,7 @@ struct TrainSettings {
                     .ramp_iterations = 50,
                     .floor_fraction = 0.02,
                     .budget = {.iterations = 0, .seconds = 600}};
-  std::vector<StaticGrid> static_grids;  // values a texel owns whatever the pose; none by default
+  std::vector<StaticGrid> static_grids;  // values a texel owns whatever the pose
   model::StaticColour static_colour = model::StaticColour::kGain;  // packages hold gains alone
   double static_learning_rate = 1.5e-2;  // peak of AdamW for the static values, on the network's
                                          // schedule; 0: they stay
@@ -109,8 +113,10 @@ std::string to_string(const std::vector<StaticGrid>& grids);
 // Throws InputError "where: FIELD: reason" unless network and static grids fit T and each other.
 void check_parts(const TrainSettings& settings, const std::string& where);
 
-// Settings of a preset with its own Fourier channels and SH degree, all else as above.
+// What a preset says of itself, all else as above.
 TrainSettings preset_settings(const std::string& name);
+// The same with a network for all texels and no static values: what a population's members are.
+TrainSettings network_alone(TrainSettings settings);
 
 // bf16 where the CPU multiplies it in hardware, float elsewhere.
 bool has_fast_bf16();

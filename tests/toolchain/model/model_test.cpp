@@ -315,7 +315,7 @@ TEST(Muon, MakesSingularValuesEqual) {
 
 TEST(Muon, StaysFiniteAtTheEnds) {
   EXPECT_TRUE(torch::equal(orthogonalised(torch::zeros({4, 9})), torch::zeros({4, 9})));
-  for (const float scale : {1e-38f, 1e-20f, 1e20f, 1e37f}) {
+  for (const float scale : {1e-43f, 1e-38f, 1e-20f, 1e20f, 1e37f}) {
     torch::Tensor matrix = random_tensor({8, 72}, 3) * scale;
     EXPECT_TRUE(torch::isfinite(orthogonalised(matrix)).all().item<bool>()) << scale;
     matrix = torch::zeros({8, 72});
@@ -357,6 +357,19 @@ TEST(Optimiser, MuonMovesAKernelByItsEquationsAndLeavesTheRestToAdamW) {
     EXPECT_TRUE(torch::equal(weights.narrow(0, group.begin, group.end - group.begin),
                              other.narrow(0, group.begin, group.end - group.begin)));
   }
+}
+
+// A layer that is dead has no gradient, and its momentum decays to nothing: it must not move on.
+TEST(Optimiser, MuonStopsWhereThereIsNoGradient) {
+  Optimiser muon({{0, 32, 4}}, {});
+  torch::Tensor weights = random_tensor({32}, 1);
+  ASSERT_TRUE(muon.step(weights, random_tensor({32}, 2), 1e-2));
+  const torch::Tensor after = weights.clone();
+  for (int step = 0; step < 2500; ++step) ASSERT_TRUE(muon.step(weights, torch::zeros({32}), 1e-2));
+  EXPECT_TRUE(torch::equal(weights, after));
+  ASSERT_TRUE(muon.step(weights, random_tensor({32}, 3) * 1e-30, 1e-2));
+  EXPECT_TRUE(torch::isfinite(weights).all().item<bool>());
+  EXPECT_FALSE(torch::equal(weights, after));
 }
 
 TEST(Optimiser, LeavesWeightsAloneWhenAGradientIsNotFinite) {

@@ -137,8 +137,28 @@ TEST_F(RunDirectoryTest, SettingsReadBackEqual) {
   EXPECT_EQ(to_json(settings_from_json(json, "test")), json);
 }
 
+TEST_F(RunDirectoryTest, PresetsSayWhatTheyAre) {
+  const TrainSettings edge = preset_settings("edge"), paper = preset_settings("paper");
+  EXPECT_EQ(to_json(edge).at("static_grids"), "all:T");
+  EXPECT_EQ(to_json(edge).at("network_size"), 64);
+  EXPECT_EQ(texel_side(edge), 128u);
+  // The paper to the letter.
+  EXPECT_FALSE(to_json(paper).contains("static_grids"));
+  EXPECT_EQ(network_side(paper), 256u);
+  EXPECT_EQ(paper.decoding.sh_degree, 3u);
+  EXPECT_EQ(paper.fourier_octaves, 0u);
+}
+
+// run.json of before presets had static values does not mention them: it had none.
+TEST_F(RunDirectoryTest, AnOldRunOfEdgeIsWhatItWas) {
+  const TrainSettings read =
+      settings_from_json(to_json(network_alone(preset_settings("edge"))), "test");
+  EXPECT_TRUE(read.static_grids.empty());
+  EXPECT_EQ(network_side(read), 128u);
+}
+
 TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritten) {
-  TrainSettings settings = preset_settings("edge");
+  TrainSettings settings = network_alone(preset_settings("edge"));
   const nlohmann::json plain = to_json(settings);
   for (const char* key : {"network", "network_size", "channels", "uv_size", "static_grids",
                           "static_colour", "static_learning_rate", "clip_gradient"}) {

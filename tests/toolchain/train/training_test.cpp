@@ -12,6 +12,7 @@
 #include "tests/toolchain/train/small_capture.h"
 #include "toolchain/error.h"
 #include "toolchain/pictures/contact_sheet.h"
+#include "toolchain/reconstruction/idle_channels.h"
 #include "toolchain/reconstruction/reconstruction.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/facing.h"
@@ -133,6 +134,27 @@ TEST(ContactSheet, ShowsHeadAndShouldersBelowWholePeople) {
   bool drawn = false;
   for (uint32_t y = 68; y < 68 + tile; ++y) drawn = drawn || sheet.at(4, y)[0] != 255;
   EXPECT_TRUE(drawn) << "the row is not left white";
+}
+
+TEST(IdleChannels, AreThoseThatNoPoseTurnsOn) {
+  model::PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)), {});
+  const torch::Tensor input = torch::ones({16, 16, 6});
+  reconstruction::IdleChannels fresh(unet);
+  EXPECT_EQ(fresh.idle(), fresh.channels()) << "nothing was looked at";
+  fresh.look_at(input);
+  EXPECT_LT(fresh.idle(), fresh.channels() / 2) << "as it is initialised, most pass";
+  // The first convolution's channel 2 has a bias that nothing reaches, and no weights.
+  torch::NoGradGuard no_gradient;
+  float* const weights = unet.weights().mutable_data_ptr<float>();
+  std::fill_n(weights + 2 * 54, 54, 0.0f);
+  weights[4 * 54 + 2] = -1;
+  reconstruction::IdleChannels idle(unet);
+  idle.look_at(input);
+  EXPECT_GT(idle.idle(), fresh.idle());
+  unet.weights().fill_(-1);
+  reconstruction::IdleChannels dead(unet);
+  dead.look_at(input);
+  EXPECT_EQ(dead.idle(), dead.channels());
 }
 
 TEST(GoldenView, ShowsTheFace) {
@@ -302,6 +324,8 @@ TEST(Training, OfAStaticPartAndACoarseNetworkBeatsTheNetworkAlone) {
   EXPECT_EQ(parts.at("static").at("values"), values);
   EXPECT_EQ(parts.at("static").at("bytes"), values + 4 * 14);
   EXPECT_EQ(read_run({folder.path("run")}).json.at("parts"), parts);
+  EXPECT_EQ(report.at("rectified_channels"), 14 * 8);
+  EXPECT_LT(report.at("idle_channels"), 14 * 4);
   EXPECT_TRUE(plain.at("parts").at("static").is_null());
 }
 
