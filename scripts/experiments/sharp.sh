@@ -51,14 +51,15 @@ row() {
 
 # Trained by the clock, on all cores. The preset before: no static values, a network for all texels
 # where the mesh's own layout has them.
-before=(--static-grids none --network-size 128)
+before=(--static-grids none --network-size 128 --learning-rate 2e-3)
 fast=(--minutes "$minutes" --poses 2 --views-per-pose 2)
 timed="
 shipped|$person|body|
 before|$person|body_mesh_layout|${before[*]}
 stripes|$stripes|body|
 stripes_before|$stripes|body_mesh_layout|${before[*]}
-stripes_fine|$stripes|body_256|--uv 256 --network-size 64 --static-grids colour:T,rest:T/2
+fine|$person|body_256|--preset fine
+stripes_fine|$stripes|body_256|--preset fine
 "
 while IFS='|' read -r name data row_body options; do
   # shellcheck disable=SC2086  # options are words
@@ -69,10 +70,11 @@ done <<< "$timed"
 rows="
 chosen|body|
 frozen_pose|body|--freeze-pose
-static_none|body|--static-grids none
-static_none_network_128|body|--static-grids none --network-size 128
-static_256|body_256|--uv 256 --network-size 64 --static-grids all:T
-static_colour_256|body_256|--uv 256 --network-size 64 --static-grids colour:T,rest:T/2
+learning_rate_2e-3|body|--learning-rate 2e-3
+static_none|body|--static-grids none --learning-rate 2e-3
+static_none_network_128|body|--static-grids none --network-size 128 --learning-rate 2e-3
+static_256|body_256|--preset fine --static-grids all:T
+static_colour_256|body_256|--preset fine
 static_colour_only|body|--static-grids colour:T
 static_half|body|--static-grids all:T/2
 static_sum|body|--static-colour sum

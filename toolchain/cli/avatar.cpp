@@ -212,7 +212,7 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
       ->add_option(
           "--network-size", arguments.network_size,
           "Texels a side that the network sees: 1, 1/2, 1/4 or 1/8 of the body's (default: "
-          "the preset's share: edge half, others all)")
+          "the preset's share: edge 1/2, fine 1/4, others all)")
       ->check(CLI::Range(8, 1024));
   command->add_option("--channels", arguments.channels, "Of the network (default: the preset's)")
       ->check(CLI::Range(1, 2048));
@@ -221,7 +221,7 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
       "What every texel owns whatever the pose, by groups of channels and their "
       "resolution: colour:T,rest:T/2 (all, colour, rest, geometry, offset, scale, "
       "rotation, opacity; T, T/2, T/4, T/8), or none (default: the preset's: edge all:T, "
-      "others none)");
+                      "fine colour:T,rest:T/2, others none)");
   command
       ->add_option("--static-colour", arguments.static_colour,
                    "Static colours times the network's (gain, default) or added to them (sum: an "
@@ -256,7 +256,7 @@ void add_avatar_command(CLI::App& app) {
                     "Go on from the last checkpoint, by the run's own settings");
   command->add_flag("--quiet", arguments->quiet, "No progress, no summary");
   command->add_option("--preset", arguments->preset, "Size of the network (default edge)")
-      ->check(CLI::IsMember({"nano", "edge", "paper"}));
+      ->check(CLI::IsMember({"nano", "edge", "fine", "paper"}));
   command->add_option("--init", arguments->init,
                       "Start from these weights (file or run) instead of the common initial ones");
   command->add_option("--seed", arguments->seed, "Of the order of the images (default 1)");

@@ -25,9 +25,11 @@ struct Preset {
   const char* static_grids;  // as parse_static_grids reads it
 };
 
-inline constexpr std::array<Preset, 3> kPresets{{{"nano", 32, 8, 0, 5, 1, 2e-3, "none"},
-                                                 {"edge", 128, 32, 0, 5, 2, 1e-3, "all:T"},
-                                                 {"paper", 256, 64, 3, 0, 1, 2e-3, "none"}}};
+inline constexpr std::array<Preset, 4> kPresets{
+    {{"nano", 32, 8, 0, 5, 1, 2e-3, "none"},
+     {"edge", 128, 32, 0, 5, 2, 1e-3, "all:T"},
+     {"fine", 256, 32, 0, 5, 4, 1e-3, "colour:T,rest:T/2"},  // faces from near by, fine cloth
+     {"paper", 256, 64, 3, 0, 1, 2e-3, "none"}}};
 
 // Throws InputError naming the known ones.
 const Preset& find_preset(const std::string& name);

@@ -70,7 +70,7 @@ TEST(Recipe, RefusesWhatItCannotMeanInOneLine) {
       {[](auto& j) { j.erase("seed"); }, "recipe.json.seed: missing"},
       {[](auto& j) { j["sead"] = 1; }, "sead: unknown field"},
       {[](auto& j) { j["body"] = "smpl"; }, "body: 'smpl' is neither makehuman nor mannequin"},
-      {[](auto& j) { j["preset"] = "huge"; }, "\"huge\" is none of nano, edge, paper"},
+      {[](auto& j) { j["preset"] = "huge"; }, "\"huge\" is none of nano, edge, fine, paper"},
       {[](auto& j) { j["motions"] = nlohmann::json::array(); }, "motions: is empty"},
       {[](auto& j) { j["motions"][0]["frames"] = -3; }, "motions[0].frames: not a whole number"},
       {[](auto& j) { j["capture"]["size_px"] = 8; }, "capture.size_px: must lie in 16 to 8192"},
