@@ -221,7 +221,7 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
       "What every texel owns whatever the pose, by groups of channels and their "
       "resolution: colour:T,rest:T/2 (all, colour, rest, geometry, offset, scale, "
       "rotation, opacity; T, T/2, T/4, T/8), or none (default: the preset's: edge all:T, "
-                      "fine colour:T,rest:T/2, others none)");
+      "fine colour:T,rest:T/2, others none)");
   command
       ->add_option("--static-colour", arguments.static_colour,
                    "Static colours times the network's (gain, default) or added to them (sum: an "

@@ -24,6 +24,9 @@ constexpr float kSh3[7] = {-0.5900435899266435f, 2.890611442640554f,   -0.457045
 constexpr float kReachSlack =
     1e-3f;  // in log2 of alpha, a thousand times the rounding of the blend
 constexpr float kBoxSlackPx = 1e-3f;
+// The blend's smallest power is 2^-126, which an opacity of 2^118 would lift to the cut, however
+// far away: nothing would bound the splat.
+constexpr float kMaxOpacity = 1e30f;
 constexpr float kBoxSlackRatio = 1.0001f;
 
 float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -209,8 +212,9 @@ enum class Lane : uint32_t { kVisible, kTransparent, kOutside, kBehindOrNotFinit
 Lane project_lane(const ProjectJob& job, uint32_t lane) {
   const View& view = *job.view;
   const GaussianBlock& gaussians = *job.gaussians;
-  const float opacity = gaussians.opacity[lane];
-  if (!(opacity > 0) || !is_finite(opacity)) return Lane::kBehindOrNotFinite;
+  const float given = gaussians.opacity[lane];
+  if (!(given > 0) || !is_finite(given)) return Lane::kBehindOrNotFinite;
+  const float opacity = given < kMaxOpacity ? given : kMaxOpacity;
   if (opacity < view.alpha_cut && (job.leave_out & kLeaveOutTransparent) != 0) {
     return Lane::kTransparent;
   }

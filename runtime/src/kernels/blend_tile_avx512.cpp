@@ -1,0 +1,17 @@
+// The blend in blocks, a register a block.
+#include <immintrin.h>
+
+#include "runtime/src/kernels/kernel.h"
+
+namespace figurine::kernels {
+namespace {
+
+#include "runtime/src/kernels/lanes_avx512.inc"
+
+#include "runtime/src/kernels/blend_blocks.inc"
+
+}  // namespace
+
+BlendedTile blend_tile_avx512(const BlendTileJob& job) { return blend_tile_in_blocks(job); }
+
+}  // namespace figurine::kernels
