@@ -1,0 +1,13 @@
+// resolve_rows.inc in vectors of sixteen pixels.
+#include "runtime/src/kernels/kernel.h"
+
+namespace figurine::kernels {
+namespace {
+
+#include "runtime/src/kernels/resolve_rows.inc"
+
+}  // namespace
+
+void resolve_rows_avx512(const ResolveRowsJob& job) { resolve_rows(job); }
+
+}  // namespace figurine::kernels
