@@ -131,6 +131,7 @@ void time_kernel(benchmark::State& state, kernels::ProjectBlock* kernel) {
                   .count = kLanes,
                   .sh_degree = 0,
                   .leave_out = kernels::kLeaveOutTransparent | kernels::kLeaveOutOutside,
+                  .antialiased = 0,
                   .splats = splats,
                   .depth_m = depth_m}));
     }

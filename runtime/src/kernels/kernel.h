@@ -143,7 +143,7 @@ static_assert(sizeof(Splat) == 64);
 
 // Which Gaussians are left out before anything is computed for them that nobody would see.
 enum ProjectLeaveOut : uint32_t {
-  kLeaveOutTransparent = 1,  // opacity below the cut: no pixel would take it
+  kLeaveOutTransparent = 1,  // opacity, as splatted, below the cut: no pixel would take it
   kLeaveOutOutside = 2,      // the box misses the image
 };
 
@@ -152,9 +152,10 @@ struct ProjectJob {
   const GaussianBlock* gaussians;
   uint32_t count;  // lanes that hold a Gaussian, 1 to kLanes
   uint32_t sh_degree;
-  uint32_t leave_out;  // ProjectLeaveOut
-  Splat* splats;       // [kLanes], filled where visible
-  float* depth_m;      // [kLanes], filled where visible
+  uint32_t leave_out;    // ProjectLeaveOut
+  uint32_t antialiased;  // 1: the opacity makes up for the dilation (SplatOptions::antialiased)
+  Splat* splats;         // [kLanes], filled where visible
+  float* depth_m;        // [kLanes], filled where visible
 };
 
 // One bit a lane. A lane that is in none is behind the near plane or not finite.

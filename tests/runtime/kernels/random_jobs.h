@@ -250,6 +250,7 @@ inline void compare(ProjectBlock* a, ProjectBlock* b) {
                    .count = count,
                    .sh_degree = round % 4,
                    .leave_out = round / 4 % 4,
+                   .antialiased = round / 16 % 2,
                    .splats = of_a,
                    .depth_m = depth_a};
     const ProjectedLanes lanes_a = a(job);

@@ -116,6 +116,7 @@ TEST(Visibility, NothingThatProjectionSeesIsLeftOut) {
          .count = kernels::kLanes,
          .sh_degree = 0,
          .leave_out = kernels::kLeaveOutTransparent | kernels::kLeaveOutOutside,
+         .antialiased = 0,
          .splats = splats,
          .depth_m = depth_m});
     projected_seen += lanes.visible != 0 ? 1 : 0;
