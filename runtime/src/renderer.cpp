@@ -170,7 +170,7 @@ Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view, c
   const std::span<const uint32_t> wanted = scratch.wanted_blocks();
   rasterizer.add({.blocks = static_cast<uint32_t>(wanted.size()),
                   .sh_degree = posed.sh_degree(),
-                  .antialiased = frame.splat.antialiased.value_or(false),
+                  .antialiased = frame.splat.antialiased.value_or(posed.antialiased()),
                   .fill_stage = Stage::kDecode},
                  clock, [&](uint32_t i, kernels::GaussianBlock& block) {
                    return posed.decode(scratch, wanted[i], block);

@@ -70,6 +70,21 @@ void compose_heads(const DecodeSkinJob& job, Plane* __restrict head, Plane* __re
   if (job.static_part != nullptr) add_static(*job.static_part, job.sh_values, head, sh);
 }
 
+// Gaussians blurred to their texel's smallest extent, with the weight that they had.
+void widen(const ExtentBlock& __restrict smallest, Plane* __restrict scale,
+           float* __restrict opacity) {
+  for (int k = 0; k < 3; ++k) {
+    for (uint32_t lane = 0; lane < kLanes; ++lane) {
+      const float own = scale[k][lane], s = smallest.smallest_m[lane];
+      const float wide = __builtin_sqrtf(own * own + s * s);
+      const float share = own / wide;  // not a number of nothing and nothing: then s is 0
+      const bool widens = s > 0;
+      opacity[lane] *= widens ? share : 1.0f;
+      scale[k][lane] = widens ? wide : own;
+    }
+  }
+}
+
 // Unit quaternions' rotation matrices, row-major; zero or not finite quaternions give the identity.
 // As figurine::rotation_from_quaternion (pose.h).
 void rotations_from_quaternions(const Plane* __restrict wxyz, Plane* __restrict rotation) {
@@ -151,6 +166,7 @@ void decode_skin_baseline(const DecodeSkinJob& job) {
     head[6][lane] = 1.0f + head[6][lane];
     out.opacity[lane] = logistic(head[10][lane] + job.opacity_bias);
   }
+  if (job.smallest != nullptr) widen(*job.smallest, scale, out.opacity);
   rotations_from_quaternions(head + 6, rotation);
   skin_positions(*job.transforms, out.position_m);
   skin_factors(*job.transforms, rotation, scale, out.factor);

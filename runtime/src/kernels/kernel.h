@@ -67,6 +67,11 @@ struct alignas(64) StaticBlock {
   float gain[3][kLanes];            // e^s of red, green and blue
 };
 
+// How small a block's Gaussians may be (figurine/avatar.h, SmallestExtents).
+struct alignas(64) ExtentBlock {
+  float smallest_m[kLanes];  // s, 0: as they are
+};
+
 // World-space Gaussians, as figurine::GaussianView has them.
 struct alignas(64) GaussianBlock {
   float position_m[3][kLanes];
@@ -102,6 +107,7 @@ struct DecodeSkinJob {
   const float* head[kTaps][kLanes];
   const TapBlock* taps;            // null: the first row of heads is all there is
   const StaticBlock* static_part;  // null: none
+  const ExtentBlock* smallest;     // null: none
   const CanonicalBlock* texels;
   const TransformBlock* transforms;
   float offset_scale_m, max_offset, max_log_scale, opacity_bias;  // an infinite bound is none
