@@ -128,7 +128,8 @@ Offset<void> build_content(FlatBufferBuilder& b, const Avatar& avatar) {
   return schema::CreateAvatar(b, body_name, avatar.body_hash[0], avatar.body_hash[1], preset,
                               static_cast<schema::TemplateMode>(avatar.template_mode), &statistics,
                               avatar.fourier_octaves, decoding, network, pose_statistics, golden,
-                              fixed_point, static_groups, uv_size)
+                              fixed_point, static_groups, uv_size, avatar.smallest_extents.scale_m,
+                              avatar.antialiased)
       .Union();
 }
 

@@ -159,7 +159,9 @@ Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget,
   list.add("avatar.shape", avatar.shape);
   FIG_RETURN_IF_ERROR(add_network(avatar, parts, list));
   add_static_part(avatar.static_part, list);
+  list.add("filter.smallest_extent", avatar.smallest_extents.codes);
   if (layout::needs_static_feature(avatar)) parts.required_features |= kFeatureStaticPart;
+  if (layout::needs_filter_feature(avatar)) parts.required_features |= kFeatureFilters;
   if (avatar.decoding.max_offset != 0) parts.required_features |= kFeatureBoundedOffsets;
   add_pose_statistics(avatar.pose_statistics, list);
   list.add("golden.rotations", avatar.golden.rotations, {4});

@@ -33,6 +33,9 @@ Status check_alike(const NewMember& member, const NewPopulation& population) {
     return mismatch(member,
                     "has a static part, or a network coarser than its texels: a population "
                     "does not hold them");
+  if (!own.smallest_extents.empty() || own.antialiased)
+    return mismatch(member,
+                    "has smallest extents, or is antialiased: a population does not hold that");
   if (!own.holds(Precision::kFloat32))
     return mismatch(member, "holds no float weights (figurine-train pack --precision f32)");
   if (own.body_hash != first.body_hash) {

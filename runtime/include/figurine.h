@@ -346,6 +346,15 @@ typedef enum fig_leave_out {
   FIG_LEAVE_OUT_MAX_ENUM = 0x7fffffff
 } fig_leave_out;
 
+/* Whether what widens a small Gaussian to the pixel grid is taken from its opacity: for Gaussians
+ * that were trained so. */
+typedef enum fig_antialiased {
+  FIG_ANTIALIASED_AS_TRAINED = 0, /* avatars as their packages say, other Gaussians not */
+  FIG_ANTIALIASED_OFF = 1,
+  FIG_ANTIALIASED_ON = 2,
+  FIG_ANTIALIASED_MAX_ENUM = 0x7fffffff
+} fig_antialiased;
+
 typedef struct fig_frame {
   size_t struct_bytes;
   const fig_camera* camera;
@@ -353,9 +362,10 @@ typedef struct fig_frame {
   size_t avatar_count;
   const fig_gaussians* gaussians; /* [gaussians_count] static sets; NULL for none */
   size_t gaussians_count;
-  const float* background; /* [3] RGB in [0,1], opaque; NULL: the image keeps its alpha */
-  float alpha_cut;         /* contributions below it are skipped; in (0, 0.5]; 1/255 */
-  uint32_t leave_out;      /* bits of fig_leave_out; FIG_LEAVE_OUT_ALL */
+  const float* background;     /* [3] RGB in [0,1], opaque; NULL: the image keeps its alpha */
+  float alpha_cut;             /* contributions below it are skipped; in (0, 0.5]; 1/255 */
+  uint32_t leave_out;          /* bits of fig_leave_out; FIG_LEAVE_OUT_ALL */
+  fig_antialiased antialiased; /* FIG_ANTIALIASED_AS_TRAINED */
 } fig_frame;
 FIG_DEFAULT(frame)
 

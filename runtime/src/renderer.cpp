@@ -168,8 +168,11 @@ Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view, c
                                             scratch, clock);
   if (!use.ok()) return use.status();
   const std::span<const uint32_t> wanted = scratch.wanted_blocks();
-  rasterizer.add(static_cast<uint32_t>(wanted.size()), posed.sh_degree(), Stage::kDecode, clock,
-                 [&](uint32_t i, kernels::GaussianBlock& block) {
+  rasterizer.add({.blocks = static_cast<uint32_t>(wanted.size()),
+                  .sh_degree = posed.sh_degree(),
+                  .antialiased = frame.splat.antialiased.value_or(posed.antialiased()),
+                  .fill_stage = Stage::kDecode},
+                 clock, [&](uint32_t i, kernels::GaussianBlock& block) {
                    return posed.decode(scratch, wanted[i], block);
                  });
   for (uint32_t i = 0, next = 0; i < posed.block_count(); ++i) {
@@ -274,7 +277,9 @@ Status Renderer::render(const Frame& frame, const ImageTarget& target) {
   for (const FrameAvatar& seen : frame.avatars) {
     FIG_RETURN_IF_ERROR(impl.add(seen, view, frame, clock, statistics));
   }
-  for (const GaussianView& gaussians : frame.gaussians) impl.rasterizer.add(gaussians, clock);
+  const bool antialiased = frame.splat.antialiased.value_or(false);
+  for (const GaussianView& gaussians : frame.gaussians)
+    impl.rasterizer.add(gaussians, antialiased, clock);
   impl.rasterizer.draw(target, frame.background, clock);
 
   statistics.stage_ns = clock.stage_ns();

@@ -13,6 +13,10 @@ namespace figurine::samples {
 
 namespace {
 
+constexpr const char* kAntialiasedComment =
+    "antialiased: trained with Mip-Splatting's 2D filter; draw with it (figurine splat "
+    "--antialiased, gsplat's rasterize_mode antialiased)";
+
 struct ExportOptions {
   SceneOptions scene;
   uint32_t frame = 0;
@@ -36,7 +40,12 @@ Status run_export(const ExportOptions& options) {
   const FrameAvatar posed = scene->pose(options.frame)[0];
   const Result<GaussianView> gaussians = (*renderer)->pose_avatar(posed.avatar, posed.pose);
   if (!gaussians.ok()) return gaussians.status();
-  const std::vector<std::byte> bytes = write_gaussian_ply(*gaussians);
+  // Smallest extents are in the scales and opacities; of the filter in the picture files have no
+  // word but this.
+  const bool antialiased = scene->avatar(0).avatar.antialiased;
+  std::vector<std::string> comments;
+  if (antialiased) comments.push_back(kAntialiasedComment);
+  const std::vector<std::byte> bytes = write_gaussian_ply(*gaussians, comments);
   FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.output, bytes));
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("export");
@@ -46,6 +55,7 @@ Status run_export(const ExportOptions& options) {
     json["precision"] = scene->precision(**renderer);
     json["gaussians"] = gaussians->count;
     json["sh_degree"] = gaussians->sh_degree;
+    json["antialiased"] = antialiased;
     json["size_bytes"] = bytes.size();
     print_json(json);
   }

@@ -25,6 +25,7 @@ struct SplatCommandOptions {
   std::string scene, camera, size, background, up = "+y", output;
   std::optional<float> near_m;
   float alpha_cut = kAlphaCut;
+  bool antialiased = false;
   DeviceOptions device;
 };
 
@@ -124,11 +125,12 @@ Status run_splat(const SplatCommandOptions& options) {
   const GaussianView gaussians[] = {cloud->view()};
   FrameLog log;
   const uint64_t start_ns = ports::now_ns();
-  FIG_RETURN_IF_ERROR((*renderer)->render({.camera = *camera,
-                                           .gaussians = gaussians,
-                                           .background = background->colour,
-                                           .splat = {.alpha_cut = options.alpha_cut}},
-                                          frame.target()));
+  FIG_RETURN_IF_ERROR((*renderer)->render(
+      {.camera = *camera,
+       .gaussians = gaussians,
+       .background = background->colour,
+       .splat = {.alpha_cut = options.alpha_cut, .antialiased = options.antialiased}},
+      frame.target()));
   log.add((*renderer)->statistics(), ports::now_ns() - start_ns);
   FIG_RETURN_IF_ERROR((*sink)->add(frame));
   FIG_RETURN_IF_ERROR((*sink)->finish());
@@ -145,6 +147,7 @@ Status run_splat(const SplatCommandOptions& options) {
     json["gaussians"] = cloud->count();
     json["left_out"] = cloud->left_out;
     json["sh_degree"] = cloud->sh_degree;
+    json["antialiased"] = options.antialiased;
     json["size"] = {size.width_px, size.height_px};
     json["camera"] = camera_json(*camera);
     json["stages_ms"] = log.stages_json();
@@ -180,6 +183,9 @@ Command add_splat_command(CLI::App& app) {
       ->add_option("--alpha-cut", options->alpha_cut,
                    "contributions below it are skipped; default 1/255")
       ->check(CLI::Range(1e-9f, 0.5f));
+  command->add_flag("--antialiased", options->antialiased,
+                    "for scenes that were trained with Mip-Splatting's 2D filter (gsplat: "
+                    "rasterize_mode antialiased); files do not say so");
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the camera's, or 1024x768");
   command->add_option("--background", options->background,
                       "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha");

@@ -407,10 +407,12 @@ Result<GaussianCloud> read_gaussian_ply(std::span<const std::byte> bytes, const 
   return cloud;
 }
 
-std::vector<std::byte> write_gaussian_ply(const GaussianView& gaussians) {
+std::vector<std::byte> write_gaussian_ply(const GaussianView& gaussians,
+                                          const std::vector<std::string>& comments) {
   const uint32_t coefficients = sh_coefficients(gaussians.sh_degree), rest = coefficients - 1;
-  std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                       std::to_string(gaussians.count) + "\n";
+  std::string header = "ply\nformat binary_little_endian 1.0\n";
+  for (const std::string& comment : comments) header += "comment " + comment + "\n";
+  header += "element vertex " + std::to_string(gaussians.count) + "\n";
   const auto declare = [&](const std::string& property) {
     header += "property float " + property + "\n";
   };

@@ -44,7 +44,8 @@ Result<GaussianCloud> read_gaussian_ply(std::span<const std::byte> bytes, const 
 // Binary little-endian: x y z nx ny nz f_dc f_rest opacity scale rot, 14 + 3 (d+1)^2 floats (62 for
 // degree 3). Scales and rotation are the singular values and left singular vectors of the
 // covariance factors (decompose.h); opacities 0 and 1 become logits of -16 and +16, a vanishing
-// scale exp(-30).
-std::vector<std::byte> write_gaussian_ply(const GaussianView& gaussians);
+// scale exp(-30). comments: lines of the header, each without a line end, for people.
+std::vector<std::byte> write_gaussian_ply(const GaussianView& gaussians,
+                                          const std::vector<std::string>& comments = {});
 
 }  // namespace figurine::samples

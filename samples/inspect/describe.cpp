@@ -207,6 +207,15 @@ Json describe_static_part(const StaticPart& part) {
   return {{"bytes", bytes}, {"groups", groups}};
 }
 
+Json describe_smallest_extents(const SmallestExtents& extents) {
+  if (extents.empty()) return nullptr;
+  const auto [low, high] = std::ranges::minmax(extents.codes);
+  return {{"bytes", extents.codes.size_bytes()},
+          {"scale_m", number(extents.scale_m)},
+          {"min_m", number(extents.scale_m * static_cast<float>(low))},
+          {"max_m", number(extents.scale_m * static_cast<float>(high))}};
+}
+
 const char* template_name(TemplateMode mode) {
   return mode == TemplateMode::kMean ? "mean" : "shaped";
 }
@@ -231,18 +240,21 @@ Json describe_kind(const AvatarKind& kind, const Json& rest) {
 }
 
 Json describe_avatar(const Avatar& avatar) {
-  return describe_kind(avatar, {{"shape", numbers(avatar.shape)},
-                                {"uv_size", avatar.texels_a_side()},
-                                {"fourier_octaves", avatar.fourier_octaves},
-                                {"map_mean", numbers(avatar.map_statistics.mean)},
-                                {"map_scale", numbers(avatar.map_statistics.scale)},
-                                {"decoding", describe_decoding(avatar.decoding)},
-                                {"network", describe_network(avatar.network)},
-                                {"precisions", describe_precisions(avatar)},
-                                {"fixed_point", describe_fixed_point(avatar)},
-                                {"static_part", describe_static_part(avatar.static_part)},
-                                {"pose_statistics_joints", avatar.pose_statistics.joints},
-                                {"golden", describe_golden(avatar.golden)}});
+  return describe_kind(avatar,
+                       {{"shape", numbers(avatar.shape)},
+                        {"uv_size", avatar.texels_a_side()},
+                        {"fourier_octaves", avatar.fourier_octaves},
+                        {"map_mean", numbers(avatar.map_statistics.mean)},
+                        {"map_scale", numbers(avatar.map_statistics.scale)},
+                        {"decoding", describe_decoding(avatar.decoding)},
+                        {"network", describe_network(avatar.network)},
+                        {"precisions", describe_precisions(avatar)},
+                        {"fixed_point", describe_fixed_point(avatar)},
+                        {"static_part", describe_static_part(avatar.static_part)},
+                        {"smallest_extents", describe_smallest_extents(avatar.smallest_extents)},
+                        {"antialiased", avatar.antialiased},
+                        {"pose_statistics_joints", avatar.pose_statistics.joints},
+                        {"golden", describe_golden(avatar.golden)}});
 }
 
 Json describe_member(const Package& package, size_t m) {

@@ -138,12 +138,23 @@ void print_static_part(Page& page, const Json& part) {
   page.line("static part", text);
 }
 
+void print_filters(Page& page, const Json& avatar) {
+  const Json& extents = avatar["smallest_extents"];
+  page.line("smallest extents",
+            extents.is_null()
+                ? "none"
+                : std::format("{:.2f} to {:.2f} mm, {}", 1e3 * extents["min_m"].get<double>(),
+                              1e3 * extents["max_m"].get<double>(), in_bytes(extents["bytes"])));
+  page.line("antialiased", avatar["antialiased"].get<bool>() ? "yes" : "no");
+}
+
 // What takes how much of the file.
 std::string by_part(const Json& document) {
   const std::pair<const char*, const char*> words[] = {
       {"network", "network in float"}, {"fixed", "network in fixed point"},
-      {"static", "static part"},       {"pose", "pose statistics"},
-      {"golden", "golden frame"},      {"avatar", "shape coefficients"}};
+      {"static", "static part"},       {"filter", "smallest extents"},
+      {"pose", "pose statistics"},     {"golden", "golden frame"},
+      {"avatar", "shape coefficients"}};
   std::string text = in_bytes(document["size_bytes"]);
   for (const auto& [name, bytes] : document["parts"].items()) {
     std::string label = name;
@@ -165,6 +176,7 @@ void print_avatar(Page& page, const Json& avatar) {
   page.line("map", std::format("{0}x{0} texels", text_of(avatar["uv_size"])));
   print_network(page, avatar["network"]);
   print_static_part(page, avatar["static_part"]);
+  print_filters(page, avatar);
   page.line("precision", joined(avatar["precisions"], ", "));
   if (const Json& fixed = avatar["fixed_point"]; !fixed.is_null()) {
     page.line("fixed point",

@@ -72,7 +72,8 @@ void time_kernel(benchmark::State& state, kernels::PoseMaps* kernel) {
   count_items(state, kBlocks * kLanes);
 }
 
-// Of an avatar as the shipped ones are, or of one with a coarser network and a static part.
+// Of an avatar as the shipped ones are, or of one with a coarser network, a static part and
+// smallest extents.
 void time_decode(benchmark::State& state, kernels::DecodeSkin* kernel, bool composed) {
   Random random(3);
   std::vector<kernels::TransformBlock> transforms(kBlocks);
@@ -82,6 +83,7 @@ void time_decode(benchmark::State& state, kernels::DecodeSkin* kernel, bool comp
   std::fill_n(texels.extent_m, kLanes, 0.005f);
   const kernels::TapBlock taps = kernels::tests::make_taps(random, false);
   const kernels::StaticBlock static_part = kernels::tests::make_static(random, false);
+  const kernels::ExtentBlock smallest = kernels::tests::make_extents(random);
   float heads[kLanes][14];
   for (auto& head : heads) {
     for (float& value : head) value = random.normal();
@@ -90,6 +92,7 @@ void time_decode(benchmark::State& state, kernels::DecodeSkin* kernel, bool comp
   kernels::DecodeSkinJob job{.head = {},
                              .taps = composed ? &taps : nullptr,
                              .static_part = composed ? &static_part : nullptr,
+                             .smallest = composed ? &smallest : nullptr,
                              .texels = &texels,
                              .transforms = nullptr,
                              .offset_scale_m = 0.05f,
@@ -131,6 +134,7 @@ void time_kernel(benchmark::State& state, kernels::ProjectBlock* kernel) {
                   .count = kLanes,
                   .sh_degree = 0,
                   .leave_out = kernels::kLeaveOutTransparent | kernels::kLeaveOutOutside,
+                  .antialiased = 0,
                   .splats = splats,
                   .depth_m = depth_m}));
     }

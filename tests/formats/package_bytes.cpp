@@ -175,6 +175,17 @@ bool exercise_static_part(const Avatar& avatar) {
   return true;
 }
 
+// Every extent as the device computes it: its square, if it is not zero, is normal.
+bool exercise_smallest_extents(const Avatar& avatar) {
+  const SmallestExtents& extents = avatar.smallest_extents;
+  if (!validate_smallest_extents(extents, avatar.texels_a_side()).ok()) return false;
+  for (size_t i = 0; i < extents.codes.size(); ++i) {
+    const float s = extents.extent_m(i);
+    if (!(s >= 0) || !(extents.codes[i] == 0 ? s == 0 : std::isnormal(s * s))) return false;
+  }
+  return true;
+}
+
 bool exercise_golden(const GoldenFrame& golden) {
   if (golden.rotations.empty()) return golden.png.empty();
   const uint32_t joints = static_cast<uint32_t>(golden.rotations.size() / 4);
@@ -186,6 +197,8 @@ bool exercise_avatar(const Avatar& avatar, std::string& reason) {
   if (avatar.has_network() && !exercise_network(avatar, reason)) return false;
   reason = "a static part";
   if (!exercise_static_part(avatar)) return false;
+  reason = "smallest extents";
+  if (!exercise_smallest_extents(avatar)) return false;
   reason = "shape or pose statistics";
   const size_t features = avatar.pose_statistics.joints.size() * 3;
   if (avatar.pose_statistics.mean.size() != features ||

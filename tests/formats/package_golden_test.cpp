@@ -53,7 +53,8 @@ TEST(PackageGolden, TodaysReaderReadsTheGoldenBytes) {
       {SampleKind::kHalfPopulation, "9534fbbf8f780e60bf2c31480e6a566a"},
       {SampleKind::kSampler, "37c01096e6a65cd32cc813da0c34f7b8"},
       {SampleKind::kStaticAvatar, "d4f80846a7bbca94f4599dc86a079988"},
-      {SampleKind::kStaticOnlyAvatar, "588a70e90250cc1c0e3a0ccdaa3903f2"}};
+      {SampleKind::kStaticOnlyAvatar, "588a70e90250cc1c0e3a0ccdaa3903f2"},
+      {SampleKind::kFilteredAvatar, "28ef19cd6a61e627ced1dfdcc1291923"}};
   for (const auto& [kind, hash] : expected) {
     const samples::ExactBytes bytes(read_golden(kind));
     const Result<Package> package = Package::open(bytes.bytes(), golden_path(kind));

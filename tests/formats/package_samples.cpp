@@ -212,6 +212,12 @@ StaticOnlyAvatarSample::StaticOnlyAvatarSample() {
   avatar.golden.fixed_point_hash = {0x1111222233334444u, 0x5555666677778888u};
 }
 
+FilteredAvatarSample::FilteredAvatarSample() : extents{0, 1, 100, 254, 255} {
+  avatar.name = "sample avatar with filters";
+  avatar.smallest_extents = {.scale_m = 0x1p-17f, .codes = extents};
+  avatar.antialiased = true;
+}
+
 PopulationSample::PopulationSample(DifferenceCoding coding)
     : initial(std::make_unique<AvatarSample>()) {
   for (size_t m = 0; m < 3; ++m) {
@@ -250,6 +256,7 @@ std::string to_string(SampleKind kind) {
   if (kind == SampleKind::kHalfPopulation) return "half_population";
   if (kind == SampleKind::kStaticAvatar) return "static_avatar";
   if (kind == SampleKind::kStaticOnlyAvatar) return "static_only_avatar";
+  if (kind == SampleKind::kFilteredAvatar) return "filtered_avatar";
   return figurine::to_string(package_kind(kind));
 }
 
@@ -261,6 +268,7 @@ PackageKind package_kind(SampleKind kind) {
     case SampleKind::kFixedPointAvatar:
     case SampleKind::kStaticAvatar:
     case SampleKind::kStaticOnlyAvatar:
+    case SampleKind::kFilteredAvatar:
       return PackageKind::kAvatar;
     case SampleKind::kMotion:
       return PackageKind::kMotion;
@@ -293,6 +301,8 @@ Result<std::vector<std::byte>> write_sample(SampleKind kind) {
       return StaticAvatarSample().write();
     case SampleKind::kStaticOnlyAvatar:
       return StaticOnlyAvatarSample().write();
+    case SampleKind::kFilteredAvatar:
+      return FilteredAvatarSample().write();
   }
   return Status(StatusCode::kInvalidArgument, "no such sample");
 }

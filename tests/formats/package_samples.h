@@ -76,6 +76,12 @@ struct StaticOnlyAvatarSample : StaticAvatarSample {
   StaticOnlyAvatarSample();
 };
 
+// The avatar with a static part, and the filters of one that was trained for near and far.
+struct FilteredAvatarSample : StaticAvatarSample {
+  FilteredAvatarSample();
+  std::vector<uint8_t> extents;  // [5]
+};
+
 // Three avatars of one network, each a little different from common initial weights: one
 // population, in integers or in halves.
 struct PopulationSample {
@@ -124,12 +130,14 @@ enum class SampleKind {
   kHalfPopulation,
   kSampler,
   kStaticAvatar,
-  kStaticOnlyAvatar
+  kStaticOnlyAvatar,
+  kFilteredAvatar
 };
 inline constexpr SampleKind kSampleKinds[] = {
-    SampleKind::kBody,    SampleKind::kAvatar,       SampleKind::kFixedPointAvatar,
-    SampleKind::kMotion,  SampleKind::kPopulation,   SampleKind::kHalfPopulation,
-    SampleKind::kSampler, SampleKind::kStaticAvatar, SampleKind::kStaticOnlyAvatar};
+    SampleKind::kBody,          SampleKind::kAvatar,       SampleKind::kFixedPointAvatar,
+    SampleKind::kMotion,        SampleKind::kPopulation,   SampleKind::kHalfPopulation,
+    SampleKind::kSampler,       SampleKind::kStaticAvatar, SampleKind::kStaticOnlyAvatar,
+    SampleKind::kFilteredAvatar};
 std::string to_string(SampleKind kind);  // also the name of its golden file: "fixed_point_avatar"
 PackageKind package_kind(SampleKind kind);
 Result<std::vector<std::byte>> write_sample(SampleKind kind);

@@ -66,6 +66,7 @@ struct Splat {
   double mean_px[2] = {0, 0};
   double a = 0, b = 0, c = 0;  // dilated 2D covariance [[a,b],[b,c]]
   double determinant = 0;      // by Cauchy-Binet
+  double undilated = 0;        // the same before the dilation
   double opacity = 0;
   double rgb[3] = {0, 0, 0};
 };
@@ -143,8 +144,8 @@ inline Splat project(const Gaussians& gaussians, size_t i, const Camera& camera)
   splat.a = xx + e;
   splat.b = row_x[0] * row_y[0] + row_x[1] * row_y[1] + row_x[2] * row_y[2];
   splat.c = yy + e;
-  splat.determinant =
-      minors[0] * minors[0] + minors[1] * minors[1] + minors[2] * minors[2] + e * (xx + yy) + e * e;
+  splat.undilated = minors[0] * minors[0] + minors[1] * minors[1] + minors[2] * minors[2];
+  splat.determinant = splat.undilated + e * (xx + yy) + e * e;
   if (!std::isfinite(splat.determinant) || !std::isfinite(splat.mean_px[0]) ||
       !std::isfinite(splat.mean_px[1]))
     return splat;
@@ -177,6 +178,7 @@ inline double power_at(const Splat& splat, double dx, double dy) {
 
 struct Options {
   double alpha_cut = kAlphaCut;
+  bool antialiased = false;     // opacity sqrt(det / dilated det)
   double doubt = 1e-3;          // relative distance to a threshold within which a pixel is doubtful
   bool skip_far_pixels = true;  // leave out pixels outside the ellipse's bounding box (they fail
                                 // the alpha cut): only saves time
@@ -185,7 +187,8 @@ struct Options {
 inline Image render(const Gaussians& gaussians, const Camera& camera, const Options& options = {}) {
   std::vector<Splat> splats;
   for (size_t i = 0; i < gaussians.count; ++i) {
-    const Splat splat = project(gaussians, i, camera);
+    Splat splat = project(gaussians, i, camera);
+    if (options.antialiased) splat.opacity *= std::sqrt(splat.undilated / splat.determinant);
     if (splat.visible) splats.push_back(splat);
   }
   std::stable_sort(splats.begin(), splats.end(),

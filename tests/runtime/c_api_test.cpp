@@ -232,8 +232,15 @@ TEST_F(CApi, SwitchesAndFormatsArriveWhereTheyBelong) {
     ASSERT_EQ(pixels[i], red[i + 2]);
     ASSERT_EQ(pixels[i + 1], red[i + 1]);
   }
-  frame.alpha_cut = 0.4f;
   image.format = FIG_PIXEL_RGBA8;
+  frame.antialiased = FIG_ANTIALIASED_OFF;
+  EXPECT_OK(fig_renderer_render(timed, &frame, &image));
+  EXPECT_EQ(pixels, red) << "as the avatar was trained";
+  frame.antialiased = FIG_ANTIALIASED_ON;
+  EXPECT_OK(fig_renderer_render(timed, &frame, &image));
+  EXPECT_NE(pixels, red);
+  frame.antialiased = FIG_ANTIALIASED_AS_TRAINED;
+  frame.alpha_cut = 0.4f;
   EXPECT_OK(fig_renderer_render(timed, &frame, &image));
   EXPECT_NE(pixels, red);
 
@@ -674,7 +681,9 @@ TEST_F(CApi, UnsoundValuesAreRefused) {
   EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "leave_out");
   frame.leave_out = FIG_LEAVE_OUT_ALL, frame.alpha_cut = 0;
   EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "alpha cut");
-  frame.alpha_cut = 0.01f, camera.fx_px = 0;
+  frame.alpha_cut = 0.01f, frame.antialiased = static_cast<fig_antialiased>(3);
+  EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "frame: unknown antialiased 3");
+  frame.antialiased = FIG_ANTIALIASED_AS_TRAINED, camera.fx_px = 0;
   EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "camera");
   camera.fx_px = camera.fy_px, image.format = static_cast<fig_pixel_format>(256);
   EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "pixel format");

@@ -111,6 +111,23 @@ TEST_P(LeaveOutScene, EachSwitchAloneIsExact) {
   }
 }
 
+TEST_P(LeaveOutScene, EachSwitchIsExactWithFiltersToo) {
+  std::vector<uint8_t> extents;  // up to 5 mm
+  for (uint32_t i = 0; i < body_.body().texel_count(); ++i)
+    extents.push_back(static_cast<uint8_t>(i * 91 % 256));
+  avatar_.avatar.smallest_extents = {.scale_m = 2e-5f, .codes = extents};
+  avatar_.avatar.antialiased = true;
+  const Drawn none = draw(kNothing), all = draw({});
+  ASSERT_EQ(all.rgba, none.rgba);
+  EXPECT_GT(all.statistics.left_out.hidden_texels, 0u);
+  EXPECT_GT(all.statistics.left_out.transparent, 0u);
+  for (const auto member : {&LeaveOut::hidden_texels, &LeaveOut::transparent, &LeaveOut::outside}) {
+    LeaveOut one = kNothing;
+    one.*member = true;
+    ASSERT_EQ(draw(one).rgba, none.rgba);
+  }
+}
+
 TEST_P(LeaveOutScene, ANetworkDoesNotRunForThePoseOfItsLastRun) {
   const std::unique_ptr<Renderer> renderer = tests::make_renderer();
   const Result<AvatarId> id = renderer->add_avatar(avatar_.avatar, *body_.package);

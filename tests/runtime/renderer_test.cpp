@@ -177,6 +177,70 @@ TEST(Renderer, AnAvatarsPictureIsTheOraclesOfItsGaussians) {
   EXPECT_GT(foreground, 1000u) << "the avatar must be in the picture";
 }
 
+TEST(Renderer, AntialiasedIsWhatThePackageSaysUnlessTheFrameDoes) {
+  const SyntheticBody body = make_test_body({.uv_size = 32});
+  const SyntheticAvatar package = make_test_avatar(body);
+  const SyntheticPose pose = make_test_pose(body.body(), 2);
+  Avatar without = package.package->avatar(), with = without;
+  with.antialiased = true;
+  const std::unique_ptr<Renderer> renderer = make_renderer();
+  // Equal but for that: neither may pass for the other.
+  const AvatarId plain = *renderer->add_avatar(without, *body.package),
+                 filtered = *renderer->add_avatar(with, *body.package);
+  const Camera camera = make_test_camera(40, 30);  // texels below a pixel
+  const auto draw = [&](AvatarId id, std::optional<bool> antialiased) {
+    const FrameAvatar seen[] = {{.avatar = id, .pose = pose.view()}};
+    return tests::render(*renderer,
+                         {.camera = camera, .avatars = seen, .splat = {.antialiased = antialiased}})
+        .rgba;
+  };
+  EXPECT_EQ(draw(plain, std::nullopt), draw(plain, false));
+  EXPECT_EQ(draw(filtered, std::nullopt), draw(plain, true));
+  EXPECT_EQ(draw(filtered, false), draw(plain, false));
+  EXPECT_NE(draw(plain, true), draw(plain, false));
+  // Side by side in a frame each keeps its own; the oracle knows one of both at a time.
+  const GaussianView posed = *renderer->pose_avatar(filtered, pose.view());
+  const oracle::Image truth =
+      oracle::render(oracle::from_view(posed), camera, {.antialiased = true});
+  const std::vector<float> drawn = draw(filtered, std::nullopt);
+  LargestError error("antialiased avatar");
+  for (size_t p = 0; p < truth.transmittance.size(); ++p)
+    if (truth.doubtful[p] == 0) error.add(drawn[4 * p + 3], truth.alpha(p));
+  EXPECT_LE(error.largest(), 2e-5);
+}
+
+TEST(Renderer, SmallestExtentsAreInTheGaussiansOfAPose) {
+  const SyntheticBody body = make_test_body({.uv_size = 32});
+  const SyntheticAvatar package = make_test_avatar(body);
+  const SyntheticPose pose = make_test_pose(body.body(), 1);
+  Avatar avatar = package.package->avatar();
+  const std::unique_ptr<Renderer> renderer = make_renderer();
+  const auto gaussians = [&] {
+    const GaussianView view =
+        *renderer->pose_avatar(*renderer->add_avatar(avatar, *body.package), pose.view());
+    return std::pair{std::vector<float>(view.opacity.begin(), view.opacity.end()),
+                     std::vector<float>(view.position_m.begin(), view.position_m.end())};
+  };
+  const auto before = gaussians();
+  std::vector<uint8_t> codes(body.body().texel_count(), 50);
+  codes[3] = 0;
+  avatar.smallest_extents = {.scale_m = 1e-4f, .codes = codes};
+  const auto after = gaussians();
+  EXPECT_EQ(after.second, before.second);
+  for (size_t i = 0; i < codes.size(); ++i) {
+    if (codes[i] == 0)
+      EXPECT_EQ(after.first[i], before.first[i]);
+    else
+      EXPECT_LT(after.first[i], before.first[i]);
+  }
+  codes.pop_back();
+  avatar.smallest_extents.codes = codes;
+  const Result<AvatarId> refused = renderer->add_avatar(avatar, *body.package);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.status().code(), StatusCode::kMismatch);
+  EXPECT_NE(refused.status().message().find("smallest extents: "), std::string::npos);
+}
+
 TEST(Renderer, AvatarsAndStaticGaussiansOccludeEachOther) {
   // Two cylinders, red at z = +0.6 and blue at z = -0.6, seen from the front and from behind; a
   // green wall between them, at z = 0.

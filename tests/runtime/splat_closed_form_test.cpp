@@ -156,7 +156,7 @@ TEST(SplatClosedForm, TheAlphaCutIsAnOption) {
   scene.add_ball({0, 0, 2}, 0.1f, 0.8f, {1, 1, 1});
   const Camera camera = front_camera(65, 65, 100);
   for (const float cut : {0.5f, 1.0f / 64, kAlphaCut, 1e-3f, 1e-6f}) {
-    const FloatImage image = render(scene, camera, cut);
+    const FloatImage image = render(scene, camera, {.alpha_cut = cut});
     uint32_t covered = 0, expected = 0, doubtful = 0;
     for (uint32_t y = 0; y < 65; ++y) {
       for (uint32_t x = 0; x < 65; ++x) {
@@ -312,6 +312,26 @@ TEST(SplatClosedForm, FieldsOfViewOf1And170Degrees) {
         error.add(image.at(x, 32)[3], alpha < kAlphaCut ? 0 : alpha);
     }
     EXPECT_LE(error.largest(), 2e-6);
+  }
+}
+
+TEST(SplatClosedForm, AntialiasedWeightIsThatOfTheGaussian) {
+  // The integral of a ball's alpha over the image plane is opacity 2 pi (f s / z)^2, however small
+  // it is beside a pixel; with the dilation alone a small one weighs 0.3 px^2 more.
+  for (const float deviation_px : {0.2f, 0.5f, 1.0f, 3.0f}) {
+    Scene scene;
+    scene.add_ball({0.003f, 0.007f, 2}, deviation_px * 2 / 100, 0.5f, {1, 1, 1});
+    const auto weight = [&](bool antialiased) {
+      const FloatImage image = render(scene, front_camera(64, 64, 100),
+                                      {.alpha_cut = 1e-6f, .antialiased = antialiased});
+      double sum = 0;
+      for (size_t i = 3; i < image.rgba.size(); i += 4) sum += image.rgba[i];
+      return sum;
+    };
+    const double variance = double(deviation_px) * deviation_px, unit = 0.5 * 2 * M_PI;
+    EXPECT_NEAR(weight(true), unit * variance, 0.02 * unit * variance) << deviation_px;
+    EXPECT_NEAR(weight(false), unit * (variance + 0.3), 0.02 * unit * (variance + 0.3))
+        << deviation_px;
   }
 }
 

@@ -30,10 +30,11 @@ struct Comparison {
 constexpr double kTight = 2e-5;
 
 Comparison compare(const Scene& scene, const Camera& camera, const char* what,
-                   double alpha_cut = kAlphaCut) {
-  const FloatImage image = tests::render(scene, camera, static_cast<float>(alpha_cut));
+                   const SplatOptions& splat = {}) {
+  const FloatImage image = tests::render(scene, camera, splat);
   const oracle::Image truth =
-      oracle::render(oracle::from_view(scene.view()), camera, {.alpha_cut = alpha_cut});
+      oracle::render(oracle::from_view(scene.view()), camera,
+                     {.alpha_cut = splat.alpha_cut, .antialiased = splat.antialiased == true});
   std::vector<float> premultiplied = image.rgba;
   for (size_t i = 0; i < premultiplied.size(); i += 4) {
     for (int c = 0; c < 3; ++c) premultiplied[i + c] *= premultiplied[i + 3];
@@ -112,9 +113,19 @@ TEST(SplatOracle, TurnedAndMovedCamera) {
 TEST(SplatOracle, OtherAlphaCuts) {
   for (const float cut : {1.0f / 16, 1e-3f}) {
     const std::string what = "alpha cut " + std::to_string(cut);
-    const Comparison comparison = compare(make_random_scene(2000, 0, 50),
-                                          tests::front_camera(128, 128, 110), what.c_str(), cut);
+    const Comparison comparison =
+        compare(make_random_scene(2000, 0, 50), tests::front_camera(128, 128, 110), what.c_str(),
+                {.alpha_cut = cut});
     expect_close(comparison, cut);
+  }
+}
+
+TEST(SplatOracle, Antialiased) {
+  // From Gaussians of many pixels down to a hundredth of one.
+  for (const float focal_px : {220.0f, 40.0f, 4.0f}) {
+    const std::string what = "antialiased, focal length " + std::to_string(int(focal_px));
+    expect_close(compare(make_random_scene(4000, 0, 55), tests::front_camera(128, 128, focal_px),
+                         what.c_str(), {.antialiased = true}));
   }
 }
 

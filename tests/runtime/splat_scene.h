@@ -81,12 +81,11 @@ inline FloatImage render(Renderer& renderer, const Frame& frame) {
   return image;
 }
 
-inline FloatImage render(const Scene& scene, const Camera& camera, float alpha_cut = kAlphaCut,
+inline FloatImage render(const Scene& scene, const Camera& camera, const SplatOptions& splat = {},
                          uint32_t threads = 1) {
   const std::unique_ptr<Renderer> renderer = make_renderer(threads);
   const GaussianView view = scene.view();
-  return render(*renderer,
-                {.camera = camera, .gaussians = {&view, 1}, .splat = {.alpha_cut = alpha_cut}});
+  return render(*renderer, {.camera = camera, .gaussians = {&view, 1}, .splat = splat});
 }
 
 // A random cloud before the front camera: discs, needles and balls, all orientations, some partly

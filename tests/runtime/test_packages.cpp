@@ -169,6 +169,13 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
     static_part = std::make_unique<RandomStaticPart>(body.body(), options.seed);
     avatar.static_part = static_part->part;
   }
+  std::vector<uint8_t> extents;
+  if (options.filters) {
+    for (uint32_t i = 0; i < body.body().texel_count(); ++i)
+      extents.push_back(static_cast<uint8_t>(i * 37 % 256));
+    avatar.smallest_extents = {.scale_m = 2e-5f, .codes = extents};
+    avatar.antialiased = true;
+  }
   uint64_t macs = 0;
   std::vector<std::vector<float>> storage;
   std::unique_ptr<QuantisedNetwork> quantised;

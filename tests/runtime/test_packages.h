@@ -66,6 +66,7 @@ struct SyntheticAvatarOptions {
   Held held = Held::kFloat32;
   uint32_t network_step = 1;  // texels a side of a cell of the network's grid; 0: no network
   bool static_part = false;   // a RandomStaticPart
+  bool filters = false;       // smallest extents up to 5 mm, and antialiased
   std::string name = "test avatar";
 };
 

@@ -221,10 +221,75 @@ Rows extreme_heads() {
   return rows;
 }
 
+// Smallest extents from a nanometre to 25 m on Gaussians whose scales are at their bounds or apart
+// by e^8: a root of a sum of squares and three ratios, nothing of which may vanish into NaN.
+Rows smallest_extents() {
+  const std::string name = "smallest extents of 1 nm to 25 m on scales at their bounds";
+  double not_finite_values = 0, outside = 0, largest = 0, pixels_not_finite = 0;
+  std::vector<float> rgba;
+  for (const std::array<float, 4>& head : {std::array<float, 4>{-1e30f, -1e30f, -1e30f, 0},
+                                           {1e30f, 1e30f, 1e30f, 1e30f},
+                                           {1e30f, -1e30f, -1e30f, 0},
+                                           {0, 0, -1e30f, -1e30f},
+                                           {0, 0, 0, 3}}) {
+    FiveTexels example;
+    std::fill(example.network_weights.begin(), example.network_weights.end(), 0.0f);
+    for (size_t k = 0; k < 3; ++k) example.network_bias[3 + k] = head[k];
+    example.network_bias[10] = head[3];
+    const FiveTexelsPackages packages(example);
+    const std::unique_ptr<Renderer> renderer = std::move(Renderer::create({})).value();
+    const auto pose = [&](const Avatar& avatar) {
+      const AvatarId id = renderer->add_avatar(avatar, packages.body()).value();
+      const FrameAvatar seen[] = {{.avatar = id, .pose = example.pose}};
+      rgba.assign(size_t(example.camera.width_px) * example.camera.height_px * 4, kNan);
+      const Status drawn = renderer->render(
+          {.camera = example.camera, .avatars = seen, .splat = {.antialiased = true}},
+          {.pixels = rgba.data(),
+           .stride_bytes = 16 * size_t(example.camera.width_px),
+           .format = PixelFormat::kRgbaF32});
+      pixels_not_finite += drawn.ok() ? double(count_not_finite(rgba)) : double(rgba.size());
+      const GaussianView view = renderer->pose_avatar(id, example.pose).value();
+      not_finite_values += double(not_finite(view));
+      GaussianSet set;
+      set.covariance_factor.assign(view.covariance_factor.begin(), view.covariance_factor.end());
+      set.opacity.assign(view.opacity.begin(), view.opacity.end());
+      return set;
+    };
+    Avatar avatar = packages.avatar().avatar();
+    const GaussianSet before = pose(avatar);
+    const std::vector<uint8_t> codes{0, 1, 2, 254, 255};
+    for (const float scale_m : {kLeastExtentScale_m, 1e-5f, kMostExtentScale_m}) {
+      avatar.smallest_extents = {.scale_m = scale_m, .codes = codes};
+      const GaussianSet after = pose(avatar);
+      for (size_t i = 0; i < codes.size(); ++i) {
+        outside += !(after.opacity[i] >= 0 && after.opacity[i] <= before.opacity[i]);
+        // A column's length is a scale times what the pose makes of its axis.
+        double expected = before.opacity[i];
+        for (size_t j = 0; j < 3; ++j) {
+          double own = 0, wide = 0;
+          for (size_t r = 0; r < 3; ++r) {
+            own += std::pow(double(before.covariance_factor[9 * i + 3 * r + j]), 2);
+            wide += std::pow(double(after.covariance_factor[9 * i + 3 * r + j]), 2);
+          }
+          expected *= std::sqrt(own / wide);
+        }
+        if (expected > 1e-30)
+          largest = std::max(largest, std::abs(after.opacity[i] - expected) / expected);
+      }
+    }
+  }
+  return {
+      {name, "values of Gaussians that are not finite", Bound::kAtMost, 0, not_finite_values},
+      {name, "pixel values that are not finite, antialiased", Bound::kAtMost, 0, pixels_not_finite},
+      {name, "opacities outside 0 and what they were", Bound::kAtMost, 0, outside},
+      {name, "largest relative error of opacity times volume", Bound::kAtMost, 2e-6, largest}};
+}
+
 constexpr Case kCases[] = {{"Twists180", twists},
                            {"RotationsThatAreNone", rotations_that_are_none},
                            {"PosesFarOutside", far_poses},
-                           {"ExtremeHeads", extreme_heads}};
+                           {"ExtremeHeads", extreme_heads},
+                           {"SmallestExtents", smallest_extents}};
 
 }  // namespace
 

@@ -82,33 +82,31 @@ Camera front_camera(uint32_t size_px, float distance_m, float vertical_fov_deg) 
 }
 
 Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads,
-             float alpha_cut) {
+             const SplatOptions& splat) {
   const auto renderer = Renderer::create({.threads = threads, .allow_oversubscription = true});
   if (!renderer.ok()) stop(renderer.status());
   Picture picture;
   picture.rgba.assign(size_t(camera.width_px) * camera.height_px * 4,
                       std::numeric_limits<float>::quiet_NaN());  // every pixel must be written
-  const Status status = (*renderer)->render({.camera = camera,
-                                             .avatars = {},
-                                             .gaussians = sets,
-                                             .background = {},
-                                             .splat = {.alpha_cut = alpha_cut}},
-                                            {.pixels = picture.rgba.data(),
-                                             .stride_bytes = 4 * sizeof(float) * camera.width_px,
-                                             .format = PixelFormat::kRgbaF32});
+  const Status status = (*renderer)->render(
+      {.camera = camera, .avatars = {}, .gaussians = sets, .background = {}, .splat = splat},
+      {.pixels = picture.rgba.data(),
+       .stride_bytes = 4 * sizeof(float) * camera.width_px,
+       .format = PixelFormat::kRgbaF32});
   if (!status.ok()) stop(status);
   picture.statistics = (*renderer)->statistics();
   return picture;
 }
 
-Picture draw(const GaussianSet& set, const Camera& camera) {
+Picture draw(const GaussianSet& set, const Camera& camera, const SplatOptions& splat) {
   const GaussianView view = set.view();
-  return draw({&view, 1}, camera);
+  return draw({&view, 1}, camera, 1, splat);
 }
 
-Agreement compare_with_oracle(const GaussianSet& set, const Camera& camera) {
-  Picture picture = draw(set, camera);
-  const oracle::Image truth = oracle::render(oracle::from_view(set.view()), camera);
+Agreement compare_with_oracle(const GaussianSet& set, const Camera& camera, bool antialiased) {
+  Picture picture = draw(set, camera, {.antialiased = antialiased});
+  const oracle::Image truth =
+      oracle::render(oracle::from_view(set.view()), camera, {.antialiased = antialiased});
   Agreement agreement;
   agreement.not_finite = count_not_finite(picture.rgba);
   for (size_t pixel = 0; pixel < truth.transmittance.size(); ++pixel) {
@@ -129,7 +127,11 @@ Agreement compare_with_oracle(const GaussianSet& set, const Camera& camera) {
 
 void add_agreement(Rows& rows, const std::string& name, const GaussianSet& set,
                    const Camera& camera, double at_least_db, double flip) {
-  const Agreement agreement = compare_with_oracle(set, camera);
+  add_agreement(rows, name, compare_with_oracle(set, camera), at_least_db, flip);
+}
+
+void add_agreement(Rows& rows, const std::string& name, const Agreement& agreement,
+                   double at_least_db, double flip) {
   rows.push_back({name, "foreground psnr_db against the float64 oracle", Bound::kAtLeast,
                   at_least_db, agreement.psnr_db});
   rows.push_back({name, "largest difference of a premultiplied channel from the float64 oracle",

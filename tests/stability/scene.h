@@ -59,8 +59,8 @@ struct Picture {
   FrameStatistics statistics;
 };
 Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads = 1,
-             float alpha_cut = kAlphaCut);
-Picture draw(const GaussianSet& set, const Camera& camera);
+             const SplatOptions& splat = {});
+Picture draw(const GaussianSet& set, const Camera& camera, const SplatOptions& splat = {});
 
 struct Agreement {
   double psnr_db = 0;  // over pixels whose true alpha exceeds 0.5, over mid-grey; at most 200, NaN
@@ -70,12 +70,15 @@ struct Agreement {
   size_t foreground = 0;  // pixels
   size_t not_finite = 0;  // values
 };
-Agreement compare_with_oracle(const GaussianSet& set, const Camera& camera);
+Agreement compare_with_oracle(const GaussianSet& set, const Camera& camera,
+                              bool antialiased = false);
 
 // The two usual rows of a scene. flip: what one contribution at the cut, or one at the stop of an
 // opaque pixel, may change.
 void add_agreement(Rows& rows, const std::string& name, const GaussianSet& set,
                    const Camera& camera, double at_least_db, double flip);
+void add_agreement(Rows& rows, const std::string& name, const Agreement& agreement,
+                   double at_least_db, double flip);
 
 size_t count_not_finite(std::span<const float> values);
 size_t count_different(std::span<const float> a, std::span<const float> b);  // bitwise

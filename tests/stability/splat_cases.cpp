@@ -153,6 +153,74 @@ Rows above_the_screen() {
   return rows;
 }
 
+// The opacity that makes up for the dilation is a root of a ratio of determinants: both may be tiny
+// beside each other, underflow, or be zero.
+Rows antialiased() {
+  Rows rows;
+  const Camera camera = front_camera();
+  const auto add = [&](const std::string& name, const GaussianSet& set, const Camera& from,
+                       double at_least_db, double flip) {
+    add_agreement(rows, "antialiased: " + name, compare_with_oracle(set, from, true), at_least_db,
+                  flip);
+  };
+  add("Gaussians of 2 cm", make_cloud({}), camera, 105, kStopFlip);
+  add("Gaussians of a quarter of a pixel",
+      make_cloud({.count = 60000,
+                  .half_size_m = 0.2f,
+                  .scale_m = {0.002f, 0.002f, 0.002f},
+                  .opacity_low = 0.9,
+                  .opacity_high = 1}),
+      camera, 100, kStopFlip);
+  add("Gaussians of 1,000 km",
+      make_cloud(
+          {.count = 50, .scale_m = {1e6f, 1e6f, 1e6f}, .opacity_low = 0.02, .opacity_high = 0.2}),
+      camera, 105, kCutFlip);
+  add("needles of 0.5 m by 1 mm, most of them along the view",
+      make_cloud({.count = 20000, .half_size_m = 0.3f, .scale_m = {0.5f, 0.001f, 0.001f}}), camera,
+      90, kStopFlip);
+  add("discs of 5 cm by 10 um, opacity 1",
+      make_cloud({.count = 4000,
+                  .half_size_m = 0.4f,
+                  .scale_m = {0.05f, 0.05f, 1e-5f},
+                  .opacity_low = 1,
+                  .opacity_high = 1}),
+      camera, 100, kStopFlip);
+  // Edge-on to the last bit, points, and determinants that underflow float: nothing is left.
+  GaussianSet nothing;
+  for (const Vector& scale :
+       {Vector{0.1f, 0, 0.1f}, Vector{0.1f, 0, 0}, Vector{0, 0, 0}, Vector{1e-15f, 1e-15f, 1e-15f},
+        Vector{1e-25f, 1e-25f, 1e-25f}, Vector{kDenormal, kDenormal, kDenormal}}) {
+    nothing.add({0, 0, 0}, factor_of({1, 0, 0, 0}, scale), 1, {1, 1, 1});
+  }
+  const Picture picture = draw(nothing, camera, {.antialiased = true});
+  rows.push_back({"antialiased: discs edge-on, lines, points and determinants that underflow",
+                  "pixels drawn", Bound::kAtMost, 0, double(drawn_pixels(picture))});
+  rows.push_back({"antialiased: discs edge-on, lines, points and determinants that underflow",
+                  "values that are not finite", Bound::kAtMost, 0,
+                  double(count_not_finite(picture.rgba))});
+  const Picture clear =
+      draw(make_cloud({.opacity_low = 0, .opacity_high = 0}), camera, {.antialiased = true});
+  rows.push_back(
+      {"antialiased: opacity 0", "pixels drawn", Bound::kAtMost, 0, double(drawn_pixels(clear))});
+  // From 1/8 to 8 times the distance a ball's light falls as its area does.
+  double least = kInfinity, most = 0;
+  for (const float distance_m : {1.5f, 3.0f, 6.0f, 12.0f, 24.0f}) {
+    GaussianSet ball;
+    ball.add({0, 0, 0}, factor_of({1, 0, 0, 0}, {0.01f, 0.01f, 0.01f}), 0.9f, {1, 1, 1});
+    double weight = 0;
+    const Picture seen =
+        draw(ball, front_camera(64, distance_m), {.alpha_cut = 1e-6f, .antialiased = true});
+    for (size_t i = 3; i < seen.rgba.size(); i += 4) weight += seen.rgba[i];
+    weight *= double(distance_m) * distance_m;
+    least = std::min(least, weight);
+    most = std::max(most, weight);
+  }
+  rows.push_back({"antialiased: a Gaussian of 1 cm from 1.5 m to 24 m, a pixel of 17 mm to 27 cm",
+                  "relative change of its summed alpha times the distance squared", Bound::kAtMost,
+                  0.02, (most - least) / most});
+  return rows;
+}
+
 Rows opacities() {
   Rows rows;
   const Camera camera = front_camera();
@@ -360,6 +428,7 @@ constexpr Case kCases[] = {{"NearSingularCovariances", near_singular},
                            {"BehindTheCamera", behind_the_camera},
                            {"SmallerThanAPixel", below_a_pixel},
                            {"LargerThanTheScreen", above_the_screen},
+                           {"Antialiased", antialiased},
                            {"Opacities", opacities},
                            {"ManyTransparentLayers", many_layers},
                            {"FarFromTheOrigin", far_from_the_origin},

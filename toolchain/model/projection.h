@@ -5,7 +5,8 @@
 // clamped in the Jacobian only, G = R F, rows u and v of the projected 2x3 factor, a = u.u + e, b =
 // u.v, c = v.v + e, determinant by Cauchy-Binet. The blend's parameters are
 //   power = -(P (dx - K dy)^2 + Q dy^2),   P = c / (2 det), K = b / c, Q = 1 / (2 c).
-// Based on: Zwicker et al., EWA Splatting, 2002, eq. 22-31.
+// Where splats are antialiased, opacities are multiplied by rho = sqrt(n.n / det), n = u x v.
+// Based on: Zwicker et al., EWA Splatting, 2002, eq. 22-31; Yu et al., Mip-Splatting, 2024 (the 2D filter).
 #pragma once
 
 #include <cmath>
@@ -53,6 +54,10 @@ struct Projected {
   Scalar view_factor[9];  // G
   Scalar row_x[3], row_y[3], minors[3];
   Scalar mean[2], a, b, c, determinant;
+  Scalar undilated;  // n.n, the determinant before the dilation
+
+  // What antialiasing leaves of the opacity, rho.
+  Scalar compensation() const { return std::sqrt(undilated / determinant); }
 };
 
 // Real spherical harmonics of the unit direction, and optionally the derivatives by x, y, z as if
@@ -137,17 +142,17 @@ bool project(const ProjectionCamera<Scalar>& camera, const Scalar* position, con
   out.a = uu + e;
   out.b = uv;
   out.c = vv + e;
-  out.determinant = (out.minors[0] * out.minors[0] + out.minors[1] * out.minors[1] +
-                     out.minors[2] * out.minors[2]) +
-                    (e * (uu + vv) + e * e);
+  out.undilated =
+      out.minors[0] * out.minors[0] + out.minors[1] * out.minors[1] + out.minors[2] * out.minors[2];
+  out.determinant = out.undilated + (e * (uu + vv) + e * e);
   return std::isfinite(out.determinant) && std::isfinite(out.a) && std::isfinite(out.b) &&
          std::isfinite(out.c) && std::isfinite(out.mean[0]) && std::isfinite(out.mean[1]);
 }
 
-// dL/d of mean, P, K and Q.
+// dL/d of mean, P, K and Q, and of ln rho (0 where splats are not antialiased).
 template <class Scalar>
 struct ProjectedGradient {
-  Scalar mean[2], p, k, q;
+  Scalar mean[2], p, k, q, log_compensation;
 };
 
 // Gradient to position and factor (overwritten).
@@ -157,7 +162,12 @@ void project_backward(const ProjectionCamera<Scalar>& camera, const Projected<Sc
                       Scalar* factor_gradient) {
   const Scalar inverse_det = 1 / at.determinant, inverse_c = 1 / at.c;
   // P = c / (2 det), K = b / c, Q = 1 / (2 c)
-  const Scalar d_det = -gradient.p * at.c * Scalar(0.5) * inverse_det * inverse_det;
+  // ln rho = (ln n.n - ln det) / 2; whose n.n is zero is transparent and has no gradient
+  const Scalar d_det = -gradient.p * at.c * Scalar(0.5) * inverse_det * inverse_det -
+                       gradient.log_compensation * Scalar(0.5) * inverse_det;
+  const Scalar d_undilated = gradient.log_compensation == 0
+                                 ? Scalar(0)
+                                 : gradient.log_compensation * Scalar(0.5) / at.undilated;
   const Scalar d_b = gradient.k * inverse_c;
   const Scalar d_c = gradient.p * Scalar(0.5) * inverse_det -
                      gradient.k * at.b * inverse_c * inverse_c -
@@ -170,6 +180,8 @@ void project_backward(const ProjectionCamera<Scalar>& camera, const Projected<Sc
     const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
     du[k] = 2 * d_det * (v[k1] * n[k2] - v[k2] * n[k1] + e * u[k]) + d_b * v[k];
     dv[k] = 2 * d_det * (n[k1] * u[k2] - n[k2] * u[k1] + e * v[k]) + d_b * u[k] + 2 * d_c * v[k];
+    du[k] += 2 * d_undilated * (v[k1] * n[k2] - v[k2] * n[k1]);
+    dv[k] += 2 * d_undilated * (n[k1] * u[k2] - n[k2] * u[k1]);
   }
   // u = (fx/z) (G0 - tx G2), v = (fy/z) (G1 - ty G2)
   const Scalar inverse_z = 1 / at.view[2];

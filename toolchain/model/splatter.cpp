@@ -106,12 +106,14 @@ void Splatter<Scalar>::Impl::project_chunk(uint32_t begin, uint32_t end) {
   const Scalar log2_cut = std::log2(cut);
   for (uint32_t i = begin; i < end; ++i) {
     depth_keys[i] = kNotVisible;
-    const Scalar opacity = gaussians.opacity[i];
+    Scalar opacity = gaussians.opacity[i];
     if (!(opacity >= cut) || !std::isfinite(opacity)) continue;
     Projected<Scalar> at;
     if (!project(view, gaussians.position_m + 3 * size_t(i),
                  gaussians.covariance_factor + 9 * size_t(i), at))
       continue;
+    if (options.antialiased) opacity *= at.compensation();
+    if (!(opacity >= cut)) continue;
     SplatRecord<Scalar>& record = records[i];
     record.mean_x = at.mean[0];
     record.mean_y = at.mean[1];
@@ -242,12 +244,14 @@ void Splatter<Scalar>::Impl::backward_chunk(uint32_t begin, uint32_t end,
         .mean = {2 * p * sums[kSumST], 2 * (q * sums[kSumSY] - p * k * sums[kSumST])},
         .p = -sums[kSumSTT],
         .k = 2 * p * sums[kSumSTY],
-        .q = -sums[kSumSYY]};
+        .q = -sums[kSumSYY],
+        .log_compensation = options.antialiased ? sums[kSumS] : Scalar(0)};
     project_backward(view, at, gradient, position, factor);
     const Scalar rgb[3] = {records[i].red, records[i].green, records[i].blue};
     sh_colour_backward(view, gaussians.sh_degree, at_position, gaussians.sh + sh_stride * size_t(i),
                        rgb, sums + kSumRed, sh, position);
-    gradients.opacity[i] = sums[kSumS] / gaussians.opacity[i];  // alpha is proportional to opacity
+    // alpha is proportional to opacity, antialiased or not
+    gradients.opacity[i] = sums[kSumS] / gaussians.opacity[i];
   }
 }
 

@@ -52,6 +52,7 @@ struct GaussianGradients {
 struct SplatterOptions {
   uint32_t threads = 1;
   float alpha_cut = kAlphaCut;
+  bool antialiased = false;  // as the runtime's SplatOptions::antialiased
 };
 
 struct SplatterStatistics {

@@ -85,6 +85,32 @@ Status validate_static_part(const StaticPart& part, uint32_t uv_size);
 // The same, and one row of values for every cell that the body covers.
 Status validate_static_part(const StaticPart& part, const Body& body);
 
+// How small an avatar's Gaussians may be: at every texel what the sharpest camera that saw it in
+// training could resolve, a standard deviation in the canonical pose. Nothing that was trained says
+// what a smaller Gaussian looks like closer by. With s = scale_m * code at the texel, after
+// decoding
+//
+//   scale'_j = sqrt(scale_j^2 + s^2)      opacity' = opacity * prod_j scale_j / scale'_j
+//
+// a Gaussian blurred by one of deviation s, with the weight that it had; a code of 0 changes
+// nothing. Based on: Yu et al., Mip-Splatting, CVPR 2024 (the 3D smoothing filter).
+struct SmallestExtents {
+  float scale_m = 0;               // > 0
+  std::span<const uint8_t> codes;  // [N] of the body's texels
+  bool empty() const { return codes.empty(); }
+  float extent_m(size_t texel) const { return scale_m * static_cast<float>(codes[texel]); }
+};
+inline constexpr uint32_t kLargestExtentCode = 255;
+// Bounds of scale_m: every square below has a float, and every s > 0 a square that is normal.
+inline constexpr float kLeastExtentScale_m = 1e-9f;
+inline constexpr float kMostExtentScale_m = 0.1f;
+
+// None, or a scale within its bounds and at most a code for every texel of the map. kCorrupt
+// "smallest extents: ...".
+Status validate_smallest_extents(const SmallestExtents& extents, uint32_t uv_size);
+// The same, and one code for every texel of the body.
+Status validate_smallest_extents(const SmallestExtents& extents, const Body& body);
+
 // In which arithmetic a network is evaluated.
 enum class Precision : uint8_t { kFloat32, kFixedPoint };
 const char* to_string(Precision precision);  // "f32", "q8"
@@ -149,6 +175,8 @@ struct Avatar : AvatarKind, AvatarTraits {
   std::span<const float> shape;   // [<= S]
   FixedPointNetwork fixed_point;  // empty if the package has none
   StaticPart static_part;         // empty if the package has none
+  SmallestExtents smallest_extents;  // empty if the package has none
+  bool antialiased = false;          // trained for SplatOptions::antialiased
   PoseStatistics pose_statistics;
 
   bool has_network() const { return !network.layers.empty(); }

@@ -36,6 +36,8 @@ inline constexpr uint64_t kFeatureFixedPoint = uint64_t{1} << 0;
 inline constexpr uint64_t kFeatureBoundedOffsets = uint64_t{1} << 1;
 // An avatar has a static part, or a network on a grid coarser than the texels, or no network.
 inline constexpr uint64_t kFeatureStaticPart = uint64_t{1} << 2;
+// An avatar has smallest extents, or is to be splatted antialiased, or both.
+inline constexpr uint64_t kFeatureFilters = uint64_t{1} << 3;
 
 enum class PackageKind : uint8_t {
   kBody = 1,
@@ -154,8 +156,9 @@ std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8);
 // coefficients.
 std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape);
 
-// An avatar fits a body if the hash, the UV size, the cells of its static part, the shape count and
-// the golden pose's joint count do. kMismatch names both hashes.
+// An avatar fits a body if the hash, the UV size, the cells of its static part, the number of its
+// smallest extents, the shape count and the golden pose's joint count do. kMismatch names both
+// hashes.
 Status check_avatar_fits_body(const Avatar& avatar, const Package& body);
 Status check_motion_fits_body(const Motion& motion, const Body& body);
 

@@ -1,6 +1,6 @@
 // The meaning of an avatar package: a network whose shapes fit its weights and its head, a static
-// part whose grids fit the map, parameters that decode to sound Gaussians, a pose distribution that
-// can be inverted, a golden frame that can be drawn.
+// part whose grids fit the map, filters that have an arithmetic, parameters that decode to sound
+// Gaussians, a pose distribution that can be inverted, a golden frame that can be drawn.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -185,6 +185,15 @@ Status read_static_part(const schema::Avatar& table, BlobReader& blobs, Avatar& 
         blobs.read(name + ".values", {BlobReader::kAny, group.channels}, group.values));
   }
   return validate_static_part(out.static_part, out.texels_a_side());
+}
+
+Status read_filters(const schema::Avatar& table, BlobReader& blobs, Avatar& out) {
+  out.antialiased = table.antialiased();
+  SmallestExtents& extents = out.smallest_extents;
+  extents.scale_m = table.smallest_extent_scale_m();
+  if (extents.scale_m == 0) return {};
+  FIG_RETURN_IF_ERROR(blobs.read("filter.smallest_extent", {BlobReader::kAny}, extents.codes));
+  return validate_smallest_extents(extents, out.texels_a_side());
 }
 
 }  // namespace
@@ -375,6 +384,7 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
   FIG_RETURN_IF_ERROR(read_uv_size(table, out));
   FIG_RETURN_IF_ERROR(check_gaussians(budget, out.texels_a_side()));
   FIG_RETURN_IF_ERROR(read_static_part(table, blobs, out));
+  FIG_RETURN_IF_ERROR(read_filters(table, blobs, out));
   if (table.pose_statistics() != nullptr) {
     FIG_RETURN_IF_ERROR(
         read_pose_statistics(*table.pose_statistics(), "avatar", blobs, out.pose_statistics));

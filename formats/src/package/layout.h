@@ -37,11 +37,16 @@ static_assert(sizeof(Header) == kPackageHeaderBytes && offsetof(Header, header_c
 inline constexpr size_t kSealedHeaderBytes = offsetof(Header, header_checksum);
 
 inline constexpr uint64_t kKnownRequiredFeatures =
-    kFeatureFixedPoint | kFeatureBoundedOffsets | kFeatureStaticPart;
+    kFeatureFixedPoint | kFeatureBoundedOffsets | kFeatureStaticPart | kFeatureFilters;
 
 // Whether kFeatureStaticPart is set.
 inline bool needs_static_feature(const Avatar& avatar) {
   return !avatar.static_part.empty() || avatar.texels_a_side() != avatar.network.input_size;
+}
+
+// Whether kFeatureFilters is set.
+inline bool needs_filter_feature(const Avatar& avatar) {
+  return !avatar.smallest_extents.empty() || avatar.antialiased;
 }
 
 // The first multiple of the blob alignment at or after the offset. Offsets are below 2^63.

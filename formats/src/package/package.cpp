@@ -111,6 +111,9 @@ Status check_features(const layout::Header& header, const Content& content) {
   FIG_RETURN_IF_ERROR(check_feature(header, kFeatureStaticPart,
                                     avatar != nullptr && layout::needs_static_feature(*avatar),
                                     "static parts", "an avatar is "));
+  FIG_RETURN_IF_ERROR(check_feature(header, kFeatureFilters,
+                                    avatar != nullptr && layout::needs_filter_feature(*avatar),
+                                    "filters", "an avatar is "));
   return check_feature(header, kFeatureBoundedOffsets, has_bounded_offsets(content),
                        "bounded offsets", "a decoding is ");
 }
@@ -257,6 +260,8 @@ Status check_avatar_fits_body(const Avatar& avatar, const Package& package) {
         {"its map has ", avatar.texels_a_side(), " texels a side, the body's ", body.uv_size});
   }
   if (const Status status = validate_static_part(avatar.static_part, body); !status.ok())
+    return mismatch({status.message()});
+  if (const Status status = validate_smallest_extents(avatar.smallest_extents, body); !status.ok())
     return mismatch({status.message()});
   if (avatar.shape.size() > body.shape_count()) {
     return mismatch(

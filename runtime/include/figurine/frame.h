@@ -44,6 +44,10 @@ struct ImageTarget {
 
 struct SplatOptions {
   float alpha_cut = kAlphaCut;  // contributions below it are skipped; in (0, 0.5]
+  // What widens a Gaussian to the pixel grid takes from its opacity what it adds to its area
+  // (docs/numerics.md, "Splatting", 5): for Gaussians that were trained so, which look thin without
+  // it and others with it. None: every avatar as its package says, other Gaussians without.
+  std::optional<bool> antialiased = std::nullopt;
 };
 
 // What a frame need not compute because nobody would see it. Every omission here is exact: the

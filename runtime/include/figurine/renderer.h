@@ -76,7 +76,8 @@ class Renderer {
   // the same pixels for any number of threads.
   Status render(const Frame& frame, const ImageTarget& target);
 
-  // The world-space Gaussians of one avatar in one pose, as render() would splat them; valid until
+  // The world-space Gaussians of one avatar in one pose, as render() would splat them: its smallest
+  // extents are in them, whether it is antialiased (Avatar) is for the caller to say. Valid until
   // the next call. For export and inspection.
   Result<GaussianView> pose_avatar(AvatarId avatar, const PoseView& pose);
 

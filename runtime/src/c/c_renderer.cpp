@@ -186,6 +186,18 @@ Result<LeaveOut> leave_out_of(uint32_t bits) {
                   .stopped = has(FIG_LEAVE_OUT_STOPPED)};
 }
 
+Result<std::optional<bool>> antialiased_of(fig_antialiased given) {
+  switch (given) {
+    case FIG_ANTIALIASED_AS_TRAINED:
+      return std::optional<bool>();
+    case FIG_ANTIALIASED_OFF:
+    case FIG_ANTIALIASED_ON:
+      return std::optional<bool>(given == FIG_ANTIALIASED_ON);
+    default:
+      return invalid("frame: unknown antialiased " + std::to_string(static_cast<int>(given)));
+  }
+}
+
 // Borrows the object's arrays.
 Result<Frame> frame_of(const fig_frame* given, fig_renderer renderer, RendererObject& object) {
   fig_frame read = fig_default_frame();
@@ -194,12 +206,14 @@ Result<Frame> frame_of(const fig_frame* given, fig_renderer renderer, RendererOb
   if (!camera.ok()) return camera.status();
   const Result<LeaveOut> leave_out = leave_out_of(read.leave_out);
   if (!leave_out.ok()) return leave_out.status();
+  const Result<std::optional<bool>> antialiased = antialiased_of(read.antialiased);
+  if (!antialiased.ok()) return antialiased.status();
   FIG_RETURN_IF_ERROR(read_arrays(read, renderer, object));
   Frame frame{.camera = *camera,
               .avatars = object.seen,
               .gaussians = object.gaussians,
               .background = std::nullopt,
-              .splat = {.alpha_cut = read.alpha_cut},
+              .splat = {.alpha_cut = read.alpha_cut, .antialiased = *antialiased},
               .leave_out = *leave_out};
   if (const float* const rgb = read.background; rgb != nullptr)
     frame.background = std::array<float, 3>{rgb[0], rgb[1], rgb[2]};

@@ -67,6 +67,11 @@ struct alignas(64) StaticBlock {
   float gain[3][kLanes];            // e^s of red, green and blue
 };
 
+// How small a block's Gaussians may be (figurine/avatar.h, SmallestExtents).
+struct alignas(64) ExtentBlock {
+  float smallest_m[kLanes];  // s, 0: as they are
+};
+
 // World-space Gaussians, as figurine::GaussianView has them.
 struct alignas(64) GaussianBlock {
   float position_m[3][kLanes];
@@ -102,6 +107,7 @@ struct DecodeSkinJob {
   const float* head[kTaps][kLanes];
   const TapBlock* taps;            // null: the first row of heads is all there is
   const StaticBlock* static_part;  // null: none
+  const ExtentBlock* smallest;     // null: none
   const CanonicalBlock* texels;
   const TransformBlock* transforms;
   float offset_scale_m, max_offset, max_log_scale, opacity_bias;  // an infinite bound is none
@@ -143,7 +149,7 @@ static_assert(sizeof(Splat) == 64);
 
 // Which Gaussians are left out before anything is computed for them that nobody would see.
 enum ProjectLeaveOut : uint32_t {
-  kLeaveOutTransparent = 1,  // opacity below the cut: no pixel would take it
+  kLeaveOutTransparent = 1,  // opacity, as splatted, below the cut: no pixel would take it
   kLeaveOutOutside = 2,      // the box misses the image
 };
 
@@ -152,9 +158,10 @@ struct ProjectJob {
   const GaussianBlock* gaussians;
   uint32_t count;  // lanes that hold a Gaussian, 1 to kLanes
   uint32_t sh_degree;
-  uint32_t leave_out;  // ProjectLeaveOut
-  Splat* splats;       // [kLanes], filled where visible
-  float* depth_m;      // [kLanes], filled where visible
+  uint32_t leave_out;    // ProjectLeaveOut
+  uint32_t antialiased;  // 1: the opacity makes up for the dilation (SplatOptions::antialiased)
+  Splat* splats;         // [kLanes], filled where visible
+  float* depth_m;        // [kLanes], filled where visible
 };
 
 // One bit a lane. A lane that is in none is behind the near plane or not finite.

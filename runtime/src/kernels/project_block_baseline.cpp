@@ -1,8 +1,9 @@
 // World-space Gaussians to splats of the image, one at a time: cull, project, evaluate the colour
 // seen from the camera. The specification of every other kernel.
 //
-// Based on: Zwicker et al., EWA Splatting, 2002, eq. 26-31 (the Jacobian of the perspective map),
-// in the form of docs/numerics.md, "Splatting".
+// Based on: Zwicker et al., EWA Splatting, 2002, eq. 26-31 (the Jacobian of the perspective map);
+// Yu et al., Mip-Splatting, 2024 (the 2D filter of `antialiased`); in the form of
+// docs/numerics.md, "Splatting".
 #include "runtime/src/kernels/kernel.h"
 
 namespace figurine::kernels {
@@ -116,6 +117,7 @@ bool project_centre(const View& view, const GaussianBlock& gaussians, uint32_t l
 // The dilated covariance [[a, b], [b, c]] of a splat, in pixels.
 struct Covariance {
   float a, b, c, determinant;
+  float undilated;  // the determinant before the dilation, at most `determinant`
 };
 
 // False if anything of it is not finite.
@@ -145,8 +147,9 @@ bool project_covariance(const View& view, const GaussianBlock& gaussians, uint32
   // [u; v] and of the dilation's terms: all positive.
   const float minors[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
                            u[0] * v[1] - u[1] * v[0]};
+  covariance.undilated = dot(minors, minors);
   covariance.determinant =
-      dot(minors, minors) + kDilationPx2 * (uu + vv) + kDilationPx2 * kDilationPx2;
+      covariance.undilated + kDilationPx2 * (uu + vv) + kDilationPx2 * kDilationPx2;
   return is_finite(covariance.a) && is_finite(covariance.b) && is_finite(covariance.c) &&
          is_finite(covariance.determinant);
 }
@@ -207,23 +210,33 @@ Splat make_splat(const View& view, float opacity, const float* rgb, const Centre
           .tile_y_last = tile_of(bounds.bottom, view.height_px)};
 }
 
+// What is left of the opacity where the dilation adds nothing to a Gaussian's weight in the
+// picture: sqrt(det / dilated det), by sums of squares, so neither cancels and the ratio is within
+// 0 and 1. A needle or disc seen edge-on, whose determinant vanishes, vanishes with it.
+float antialiased(float opacity, const Covariance& covariance) {
+  return opacity * __builtin_sqrtf(covariance.undilated / covariance.determinant);
+}
+
 enum class Lane : uint32_t { kVisible, kTransparent, kOutside, kBehindOrNotFinite };
 
 Lane project_lane(const ProjectJob& job, uint32_t lane) {
   const View& view = *job.view;
   const GaussianBlock& gaussians = *job.gaussians;
-  const float given = gaussians.opacity[lane];
-  if (!(given > 0) || !is_finite(given)) return Lane::kBehindOrNotFinite;
-  const float opacity = given < kMaxOpacity ? given : kMaxOpacity;
-  if (opacity < view.alpha_cut && (job.leave_out & kLeaveOutTransparent) != 0) {
-    return Lane::kTransparent;
-  }
+  float opacity = gaussians.opacity[lane];
+  if (!(opacity > 0) || !is_finite(opacity)) return Lane::kBehindOrNotFinite;
+  opacity = opacity < kMaxOpacity ? opacity : kMaxOpacity;
+  const auto is_left_out = [&] {
+    return opacity < view.alpha_cut && (job.leave_out & kLeaveOutTransparent) != 0;
+  };
+  if (is_left_out()) return Lane::kTransparent;
   Centre centre;
   Covariance covariance;
   if (!project_centre(view, gaussians, lane, centre) ||
       !project_covariance(view, gaussians, lane, centre, covariance)) {
     return Lane::kBehindOrNotFinite;
   }
+  if (job.antialiased != 0) opacity = antialiased(opacity, covariance);
+  if (is_left_out()) return Lane::kTransparent;
   const Bounds bounds = bound(view, opacity, centre, covariance);
   if (!touches_image(view, bounds) && (job.leave_out & kLeaveOutOutside) != 0) {
     return Lane::kOutside;

@@ -85,6 +85,9 @@ AvatarIdentity identify(const Avatar& avatar, const Body& body, Precision precis
   add_layers(avatar.network, precision == Precision::kFloat32, words);
   if (precision == Precision::kFixedPoint) add_fixed_point(avatar.fixed_point, words);
   add_static_part(avatar.static_part, words);
+  words.add(avatar.smallest_extents.codes);
+  words.add(avatar.smallest_extents.scale_m);
+  words.add(uint64_t{avatar.antialiased});
   return words.hash();
 }
 

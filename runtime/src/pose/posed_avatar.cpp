@@ -36,6 +36,7 @@ Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, c
   }
   FIG_RETURN_IF_ERROR(posed->shape(avatar));
   FIG_RETURN_IF_ERROR(posed->static_blocks_.ensure(avatar.static_part, body));
+  FIG_RETURN_IF_ERROR(posed->extent_blocks_.ensure(avatar.smallest_extents, body));
   return posed;
 }
 
@@ -87,7 +88,7 @@ Status PosedAvatar::shape(const Avatar& avatar) {
 void PosedAvatar::select_blocks(const kernels::View* view, const LeaveOut& leave_out,
                                 PoseScratch& scratch) const {
   const uint32_t count = blocks_.count();
-  const GaussianBounds bounds = bounds_of(decoding_);
+  const GaussianBounds bounds = bounds_of(decoding_, extent_blocks_.largest_m());
   const bool all = view == nullptr || !leave_out.hidden_texels ||
                    !(bounds.offset_m < std::numeric_limits<float>::infinity());
   if (!all) {
@@ -191,6 +192,7 @@ uint32_t PosedAvatar::decode(const PoseScratch& scratch, uint32_t block,
   kernels::DecodeSkinJob job{.head = {},
                              .taps = nullptr,
                              .static_part = static_blocks_.of(block),
+                             .smallest = extent_blocks_.of(block),
                              .texels = &canonical_[block],
                              .transforms = &scratch.transforms[block],
                              .offset_scale_m = decoding_.offset_scale_m,
@@ -209,7 +211,7 @@ uint32_t PosedAvatar::decode(const PoseScratch& scratch, uint32_t block,
 uint64_t PosedAvatar::memory_bytes() const {
   return (network_ == nullptr ? 0 : network_->memory_bytes()) + last_run_.rotations.memory_bytes() +
          joint_position_m_.memory_bytes() + canonical_.memory_bytes() +
-         static_blocks_.memory_bytes();
+         static_blocks_.memory_bytes() + extent_blocks_.memory_bytes();
 }
 
 }  // namespace figurine

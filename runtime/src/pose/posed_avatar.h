@@ -27,6 +27,7 @@
 #include "runtime/src/pose/avatar_network.h"
 #include "runtime/src/pose/body_blocks.h"
 #include "runtime/src/pose/body_grid.h"
+#include "runtime/src/pose/extent_blocks.h"
 #include "runtime/src/pose/static_blocks.h"
 #include "runtime/src/pose/transforms.h"
 
@@ -69,8 +70,9 @@ enum class NetworkUse : uint8_t {
 class PosedAvatar {
  public:
   // The arrays behind avatar and body are borrowed and must outlive the object, as must blocks,
-  // which are the body's. The static part must fit the body (validate_static_part). grid: the
-  // network's over the body if another avatar has it, otherwise null. Errors:
+  // which are the body's. Static part and smallest extents must fit the body
+  // (validate_static_part, validate_smallest_extents). grid: the network's over the body if another
+  // avatar has it, otherwise null. Errors:
   // AvatarNetwork::create's; kCorrupt if shape or grid do not fit the body; kOutOfMemory.
   static Result<std::unique_ptr<PosedAvatar>> create(const Avatar& avatar, const Body& body,
                                                      const BodyBlocks& blocks,
@@ -81,6 +83,7 @@ class PosedAvatar {
   const Body& body() const { return body_; }
   uint32_t block_count() const { return blocks_.count(); }
   uint32_t sh_degree() const { return decoding_.sh_degree; }
+  bool antialiased() const { return antialiased_; }
   Precision precision() const { return precision_; }
   uint64_t macs() const { return network_ == nullptr ? 0 : network_->macs(); }
   // The network's; null without one.
@@ -105,7 +108,8 @@ class PosedAvatar {
         kernels_(kernels),
         precision_(precision),
         statistics_(avatar.map_statistics),
-        decoding_(avatar.decoding) {}
+        decoding_(avatar.decoding),
+        antialiased_(avatar.antialiased) {}
 
   Status shape(const Avatar& avatar);
   Status prepare_network(const Avatar& avatar, std::shared_ptr<const BodyGrid> grid);
@@ -132,12 +136,14 @@ class PosedAvatar {
   const Precision precision_;
   const MapStatistics statistics_;
   const HeadDecoding decoding_;
+  const bool antialiased_;
   std::shared_ptr<const BodyGrid> grid_;    // in front of what borrows from it
   std::unique_ptr<AvatarNetwork> network_;  // null: the static part is all there is
   LastRun last_run_;
   Buffer<float> joint_position_m_;             // [J,3] of the template the Gaussians sit on
   Buffer<kernels::CanonicalBlock> canonical_;  // [blocks]
   StaticBlocks static_blocks_;
+  ExtentBlocks extent_blocks_;
 };
 
 }  // namespace figurine

@@ -88,10 +88,11 @@ float largest_stretch(const float* a) {
 
 }  // namespace
 
-GaussianBounds bounds_of(const HeadDecoding& decoding) {
+GaussianBounds bounds_of(const HeadDecoding& decoding, float largest_m) {
   const float largest = decoding.offset_scale_m * decoding.max_offset * std::sqrt(3.0f);
   return {.offset_m = decoding.max_offset == 0 ? std::numeric_limits<float>::infinity() : largest,
-          .extents = exp_float(decoding.max_log_scale)};
+          .extents = exp_float(decoding.max_log_scale),
+          .widening_m = largest_m};  // sqrt(a^2 + s^2) <= a + s
 }
 
 bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
@@ -110,7 +111,8 @@ bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::Transform
           std::max({magnitude, std::fabs(centre[i]), std::fabs(view.view_from_world[4 * i + 3])});
     }
     const float radius_m = stretch * bounds.offset_m + 1e-5f * magnitude;
-    const float deviation_m = stretch * bounds.extents * texels.extent_m[lane];
+    const float deviation_m =
+        stretch * (bounds.extents * texels.extent_m[lane] + bounds.widening_m);
     // Written so that anything not comparable counts as seen.
     if (!(radius_m < std::numeric_limits<float>::max())) return true;
     if (sphere_may_be_seen(centre, radius_m, deviation_m, sigmas, view)) return true;

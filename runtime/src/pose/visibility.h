@@ -19,9 +19,11 @@ namespace figurine {
 // Of every Gaussian of an avatar in its canonical pose.
 struct GaussianBounds {
   float offset_m = 0;  // between texel and centre; infinite: there is no bound
-  float extents = 0;   // the largest deviation in units of CanonicalBlock::extent_m
+  // The largest deviation: in units of CanonicalBlock::extent_m, and what may come to it.
+  float extents = 0, widening_m = 0;
 };
-GaussianBounds bounds_of(const HeadDecoding& decoding);
+// largest_m: of the avatar's smallest extents (SmallestExtents); 0: it has none.
+GaussianBounds bounds_of(const HeadDecoding& decoding, float largest_m = 0);
 
 // Whether a block has a texel that may be seen.
 bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,

@@ -37,35 +37,35 @@ Status Rasterizer::begin(const kernels::View& view, const LeaveOut& leave_out, u
 }
 
 // Projects a block into its slots; the visible ones' keys follow those that the task already has.
-void Rasterizer::project(const kernels::GaussianBlock& block, uint32_t lanes, uint32_t sh_degree,
-                         uint32_t first_slot, DepthSort::Item* items, TaskResult& result) {
+void Rasterizer::project(const BlockSet& set, const FilledBlock& block, DepthSort::Item* items,
+                         TaskResult& result) {
   float depth_m[kernels::kLanes];
   const uint32_t leave_out = (leave_out_.transparent ? kernels::kLeaveOutTransparent : 0u) |
                              (leave_out_.outside ? kernels::kLeaveOutOutside : 0u);
   const kernels::ProjectedLanes projected =
       kernels_.project_block({.view = &view_,
-                              .gaussians = &block,
-                              .count = lanes,
-                              .sh_degree = sh_degree,
+                              .gaussians = &block.gaussians,
+                              .count = block.lanes,
+                              .sh_degree = set.sh_degree,
                               .leave_out = leave_out,
-                              .splats = splats_.data() + first_slot,
+                              .antialiased = set.antialiased ? 1u : 0u,
+                              .splats = splats_.data() + block.first_slot,
                               .depth_m = depth_m});
-  result.gaussians += lanes;
+  result.gaussians += block.lanes;
   result.transparent += static_cast<uint32_t>(std::popcount(projected.transparent));
   result.outside += static_cast<uint32_t>(std::popcount(projected.outside));
   for (uint32_t left = projected.visible; left != 0; left &= left - 1) {
     const uint32_t lane = static_cast<uint32_t>(std::countr_zero(left));
     items[result.visible++] = {.depth_bits = std::bit_cast<uint32_t>(depth_m[lane]),
-                               .index = first_slot + lane};
+                               .index = block.first_slot + lane};
   }
 }
 
-void Rasterizer::finish_add(uint32_t blocks, Stage fill_stage, uint64_t elapsed_ns,
-                            StageClock& clock) {
+void Rasterizer::finish_add(const BlockSet& set, uint64_t elapsed_ns, StageClock& clock) {
   // Tasks left gaps; closing them in order keeps the input order, which breaks ties of depth.
   DepthSort::Item* const items = depth_sort_.items();
   uint64_t fill_ns = 0, project_ns = 0;
-  for (uint32_t task = 0; task < (blocks + kBlocksPerTask - 1) / kBlocksPerTask; ++task) {
+  for (uint32_t task = 0; task < (set.blocks + kBlocksPerTask - 1) / kBlocksPerTask; ++task) {
     const TaskResult& result = task_result_[task];
     std::memmove(items + visible_, items + slots_ + task * kBlocksPerTask * kernels::kLanes,
                  result.visible * sizeof(DepthSort::Item));
@@ -76,13 +76,15 @@ void Rasterizer::finish_add(uint32_t blocks, Stage fill_stage, uint64_t elapsed_
     fill_ns += result.fill_ns;
     project_ns += result.project_ns;
   }
-  slots_ += blocks * kernels::kLanes;
-  divide_time(elapsed_ns, fill_stage, fill_ns, Stage::kProject, project_ns, clock);
+  slots_ += set.blocks * kernels::kLanes;
+  divide_time(elapsed_ns, set.fill_stage, fill_ns, Stage::kProject, project_ns, clock);
 }
 
-void Rasterizer::add(const GaussianView& gaussians, StageClock& clock) {
-  add(block_count(gaussians.count), gaussians.sh_degree, Stage::kProject, clock,
-      [&](uint32_t block, kernels::GaussianBlock& out) {
+void Rasterizer::add(const GaussianView& gaussians, bool antialiased, StageClock& clock) {
+  add({.blocks = block_count(gaussians.count),
+       .sh_degree = gaussians.sh_degree,
+       .antialiased = antialiased},
+      clock, [&](uint32_t block, kernels::GaussianBlock& out) {
         return load_block(gaussians, block, out);
       });
 }

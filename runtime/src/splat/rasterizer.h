@@ -35,13 +35,18 @@ class Rasterizer {
   // kOutOfMemory.
   Status begin(const kernels::View& view, const LeaveOut& leave_out, uint32_t blocks);
 
+  // Gaussians that come in blocks.
+  struct BlockSet {
+    uint32_t blocks = 0, sh_degree = 0;
+    bool antialiased = false;            // SplatOptions::antialiased
+    Stage fill_stage = Stage::kProject;  // what the time of filling blocks counts for
+  };
   // Projects a set of Gaussians behind those already added, block by block on all threads:
-  // fill(i, block) fills block i and returns how many lanes hold a Gaussian. Its time counts for
-  // `fill_stage`. Sets count in the order they are added where depths are equal.
+  // fill(i, block) fills block i and returns how many lanes hold a Gaussian. Sets count in the
+  // order they are added where depths are equal.
   template <class Fill>
-  void add(uint32_t blocks, uint32_t sh_degree, Stage fill_stage, StageClock& clock,
-           const Fill& fill);
-  void add(const GaussianView& gaussians, StageClock& clock);
+  void add(const BlockSet& set, StageClock& clock, const Fill& fill);
+  void add(const GaussianView& gaussians, bool antialiased, StageClock& clock);
 
   // Sorts, bins, blends and writes every pixel of the target, which must be valid for the view.
   void draw(const ImageTarget& target, const std::optional<std::array<float, 3>>& background,
@@ -65,9 +70,14 @@ class Rasterizer {
     uint64_t blend_ns, resolve_ns;
   };
 
-  void project(const kernels::GaussianBlock& block, uint32_t lanes, uint32_t sh_degree,
-               uint32_t first_slot, DepthSort::Item* items, TaskResult& result);
-  void finish_add(uint32_t blocks, Stage fill_stage, uint64_t elapsed_ns, StageClock& clock);
+  // A filled block and where its splats go.
+  struct FilledBlock {
+    const kernels::GaussianBlock& gaussians;
+    uint32_t lanes, first_slot;
+  };
+  void project(const BlockSet& set, const FilledBlock& block, DepthSort::Item* items,
+               TaskResult& result);
+  void finish_add(const BlockSet& set, uint64_t elapsed_ns, StageClock& clock);
   void blend_tile(uint32_t tile, const ImageTarget& target,
                   const std::optional<std::array<float, 3>>& background, StageClock& clock);
   void finish_band(const TileBins::Band& band, uint64_t elapsed_ns, StageClock& clock);
@@ -90,13 +100,12 @@ class Rasterizer {
 };
 
 template <class Fill>
-void Rasterizer::add(uint32_t blocks, uint32_t sh_degree, Stage fill_stage, StageClock& clock,
-                     const Fill& fill) {
+void Rasterizer::add(const BlockSet& set, StageClock& clock, const Fill& fill) {
   const uint64_t begin_ns = clock.now();
   const uint32_t first_slot = slots_;
-  pool_.for_each((blocks + kBlocksPerTask - 1) / kBlocksPerTask, [&](size_t task) {
+  pool_.for_each((set.blocks + kBlocksPerTask - 1) / kBlocksPerTask, [&](size_t task) {
     const uint32_t begin = static_cast<uint32_t>(task) * kBlocksPerTask,
-                   end = std::min(begin + kBlocksPerTask, blocks);
+                   end = std::min(begin + kBlocksPerTask, set.blocks);
     DepthSort::Item* const items = depth_sort_.items() + first_slot + begin * kernels::kLanes;
     TaskResult result{};
     kernels::GaussianBlock group[kBlocksPerGroup];
@@ -107,7 +116,7 @@ void Rasterizer::add(uint32_t blocks, uint32_t sh_degree, Stage fill_stage, Stag
       for (uint32_t i = 0; i < count; ++i) lanes[i] = fill(first + i, group[i]);
       const uint64_t filled_ns = clock.now();
       for (uint32_t i = 0; i < count; ++i) {
-        project(group[i], lanes[i], sh_degree, first_slot + (first + i) * kernels::kLanes, items,
+        project(set, {group[i], lanes[i], first_slot + (first + i) * kernels::kLanes}, items,
                 result);
       }
       result.fill_ns += filled_ns - started_ns;
@@ -115,7 +124,7 @@ void Rasterizer::add(uint32_t blocks, uint32_t sh_degree, Stage fill_stage, Stag
     }
     task_result_[task] = result;
   });
-  finish_add(blocks, fill_stage, clock.now() - begin_ns, clock);
+  finish_add(set, clock.now() - begin_ns, clock);
 }
 
 }  // namespace figurine

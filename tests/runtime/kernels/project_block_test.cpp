@@ -45,7 +45,8 @@ class ProjectBlock : public ::testing::TestWithParam<Isa> {
  protected:
   Projected project(const GaussianBlock& block, uint32_t count = kernels::kLanes,
                     uint32_t leave_out = kernels::kLeaveOutTransparent | kernels::kLeaveOutOutside,
-                    const kernels::View& view = front_view()) {
+                    bool antialiased = false) {
+    const kernels::View view = front_view();
     Projected projected;
     projected.lanes = (*kernels_for(GetParam()))
                           ->project_block({.view = &view,
@@ -53,6 +54,7 @@ class ProjectBlock : public ::testing::TestWithParam<Isa> {
                                            .count = count,
                                            .sh_degree = 0,
                                            .leave_out = leave_out,
+                                           .antialiased = antialiased ? 1u : 0u,
                                            .splats = projected.splats,
                                            .depth_m = projected.depth_m});
     return projected;
@@ -119,6 +121,31 @@ TEST_P(ProjectBlock, NothingLeftOutChangesAPixel) {
   EXPECT_LT(all.splats[0].reach, 2e-3f);
   EXPECT_EQ(all.splats[1].tile_x_begin, 1u);
   EXPECT_EQ(all.splats[1].tile_x_last, 1u);
+}
+
+TEST_P(ProjectBlock, AntialiasedTheDilationAddsNoWeight) {
+  constexpr uint32_t kLeaveOut = kernels::kLeaveOutTransparent | kernels::kLeaveOutOutside;
+  GaussianBlock block = balls(0, 0, 2, 0.01f, 0.8f);
+  for (int k = 0; k < 9; ++k) block.factor[k][1] = 0;  // a point
+  block.factor[0][2] = 0.1f, block.factor[4][2] = 0;   // a disc seen edge-on
+  block.factor[8][2] = 0.1f;
+  block.factor[0][3] = block.factor[4][3] = block.factor[8][3] = 1e-25f;  // squares underflow
+  block.opacity[4] = 0.0095f;  // above the cut until its dilation is made up for
+  const Projected without = project(block), with = project(block, kernels::kLanes, kLeaveOut, true);
+  EXPECT_EQ(without.lanes.visible, 0xffffu);
+  EXPECT_EQ(with.lanes.visible, 0xffe1u);
+  EXPECT_EQ(with.lanes.transparent, 0x1eu);
+  // Variances (f s / z)^2 = 0.25 and 0.16 before 0.3 is added.
+  const double left = std::sqrt(0.25 * 0.16 / ((0.25 + 0.3) * (0.16 + 0.3)));
+  EXPECT_EQ(without.splats[0].opacity, 0.8f);
+  EXPECT_NEAR(with.splats[0].opacity, 0.8 * left, 1e-6);
+  EXPECT_NEAR(with.splats[0].reach, std::log2(0.8 * left * 255) + 1e-3, 1e-4);
+  EXPECT_LT(with.splats[0].half_height, without.splats[0].half_height);
+  EXPECT_EQ(with.splats[0].scale_u, without.splats[0].scale_u) << "as wide as before";
+  // Where nothing is left out they come along and reach nothing.
+  const Projected all = project(block, kernels::kLanes, 0, true);
+  EXPECT_EQ(all.lanes.visible, 0xffffu);
+  for (const int lane : {1, 2, 3, 4}) EXPECT_LT(all.splats[lane].reach, 2e-3f) << lane;
 }
 
 TEST_P(ProjectBlock, TheBoxHoldsEveryPixelThatReachesTheCut) {

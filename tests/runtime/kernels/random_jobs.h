@@ -199,7 +199,16 @@ inline StaticBlock make_static(Random& random, bool hostile) {
   return block;
 }
 
-// With and without taps and static part, of every SH degree, every other round hostile.
+// Every third lane has none.
+inline ExtentBlock make_extents(Random& random) {
+  ExtentBlock block{};
+  for (uint32_t lane = 0; lane < kLanes; ++lane)
+    block.smallest_m[lane] = lane % 3 == 0 ? 0 : random.uniform(1e-9f, 0.02f);
+  return block;
+}
+
+// With and without taps, static part and smallest extents, of every SH degree, every other round
+// hostile.
 inline void compare(DecodeSkin* a, DecodeSkin* b) {
   Random random(3);
   for (int round = 0; round < 640; ++round) {
@@ -209,6 +218,7 @@ inline void compare(DecodeSkin* a, DecodeSkin* b) {
     const TransformBlock transforms = make_transforms(random, hostile);
     const TapBlock taps = make_taps(random, hostile);
     const StaticBlock static_part = make_static(random, hostile);
+    const ExtentBlock smallest = make_extents(random);
     CanonicalBlock texels;
     fill(texels.position_m, random, -1, 1);
     for (float& extent : texels.extent_m) extent = random.uniform(0.001f, 0.01f);
@@ -223,6 +233,7 @@ inline void compare(DecodeSkin* a, DecodeSkin* b) {
     DecodeSkinJob job{.head = {},
                       .taps = round / 8 % 2 == 0 ? nullptr : &taps,
                       .static_part = round / 16 % 2 == 0 ? nullptr : &static_part,
+                      .smallest = round / 32 % 2 == 0 ? nullptr : &smallest,
                       .texels = &texels,
                       .transforms = &transforms,
                       .offset_scale_m = 0.05f,
@@ -258,6 +269,7 @@ inline void compare(ProjectBlock* a, ProjectBlock* b) {
                    .count = count,
                    .sh_degree = round % 4,
                    .leave_out = round / 4 % 4,
+                   .antialiased = round / 16 % 2,
                    .splats = of_a,
                    .depth_m = depth_a};
     const ProjectedLanes lanes_a = a(job);

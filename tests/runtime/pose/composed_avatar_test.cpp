@@ -86,6 +86,7 @@ struct Form {
   uint32_t network_step = 1;  // T / T_n; 0: no network
   bool static_part = false;
   uint32_t sh_degree = 0;
+  bool smallest_extents = false;
 };
 
 // An avatar in memory, with random weights and values in both precisions.
@@ -93,6 +94,7 @@ struct ComposedAvatar {
   Avatar avatar;
   std::deque<std::vector<float>> floats;
   tests::RandomStaticPart static_part;
+  std::vector<uint8_t> extents;
   std::unique_ptr<tests::QuantisedNetwork> quantised;
 
   ComposedAvatar(const Body& body, const Form& form) : static_part(body, 1) {
@@ -104,6 +106,10 @@ struct ComposedAvatar {
     avatar.shape = floats.emplace_back(std::vector<float>{0.5f, -0.5f});
     if (form.network_step != 0) add_network(body, form, random);
     if (form.static_part) avatar.static_part = static_part.part;
+    if (!form.smallest_extents) return;
+    for (uint32_t i = 0; i < body.texel_count(); ++i)
+      extents.push_back(static_cast<uint8_t>(i * 37 % 256));
+    avatar.smallest_extents = {.scale_m = 1e-5f, .codes = extents};
   }
   ComposedAvatar(const ComposedAvatar&) = delete;
 
@@ -236,9 +242,12 @@ struct Stage32 {
     std::vector<kernels::GaussianBlock> gaussians;
     for (const uint32_t block : scratch.wanted_blocks()) {
       kernels::CanonicalBlock texels;
+      kernels::ExtentBlock smallest;
+      const bool widens = !avatar.smallest_extents.empty();
       kernels::DecodeSkinJob job{.head = {},
                                  .taps = nullptr,
                                  .static_part = nullptr,
+                                 .smallest = widens ? &smallest : nullptr,
                                  .texels = &texels,
                                  .transforms = &scratch.transforms[block],
                                  .offset_scale_m = avatar.decoding.offset_scale_m,
@@ -251,6 +260,9 @@ struct Stage32 {
         const uint32_t i = texel_of_lane(block, lane, body().texel_count());
         for (uint32_t k = 0; k < 3; ++k) texels.position_m[k][lane] = place[3 * i + k];
         texels.extent_m[lane] = avatar.decoding.spacing_scale * body().texel_spacing_m[i];
+        if (widens) {
+          smallest.smallest_m[lane] = 1e-5f * static_cast<float>(avatar.smallest_extents.codes[i]);
+        }
         job.head[0][lane] = &heads[size_t{i} * channels];
       }
       best_kernels().decode_skin(job);
@@ -381,18 +393,18 @@ TEST_P(ComposedAvatars, WantedTexelsAreWhatTheyAreAmongAll) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Forms, ComposedAvatars,
-                         ::testing::Values(Form{1, false, 0}, Form{2, false, 1}, Form{4, false, 0},
-                                           Form{1, true, 0}, Form{2, true, 0}, Form{4, true, 2},
-                                           Form{0, true, 0}, Form{0, true, 1}),
-                         [](const auto& of) {
-                           const Form& form = of.param;
-                           return (form.network_step == 0
-                                       ? std::string("NoNetwork")
-                                       : "Step" + std::to_string(form.network_step)) +
-                                  (form.static_part ? "Static" : "") + "Sh" +
-                                  std::to_string(form.sh_degree);
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Forms, ComposedAvatars,
+    ::testing::Values(Form{1, false, 0}, Form{2, false, 1}, Form{4, false, 0}, Form{1, true, 0},
+                      Form{2, true, 0}, Form{4, true, 2}, Form{0, true, 0}, Form{0, true, 1},
+                      Form{1, false, 0, true}, Form{2, true, 1, true}, Form{0, true, 0, true}),
+    [](const auto& of) {
+      const Form& form = of.param;
+      return (form.network_step == 0 ? std::string("NoNetwork")
+                                     : "Step" + std::to_string(form.network_step)) +
+             (form.static_part ? "Static" : "") + "Sh" + std::to_string(form.sh_degree) +
+             (form.smallest_extents ? "Smallest" : "");
+    });
 
 TEST(RunsOfTheNetwork, HappenForEveryOtherPoseAndWhereTheSwitchIsOff) {
   Stage32 stage;

@@ -112,7 +112,12 @@ struct Gaussian {
   float opacity;
 };
 
-Gaussian decode(const HeadDecoding& d, const float* h, const float* texel, float extent_m,
+struct Extents {
+  float spacing_m;  // of scale 1
+  float smallest_m;
+};
+
+Gaussian decode(const HeadDecoding& d, const float* h, const float* texel, const Extents& extents,
                 const Affine& transform) {
   const auto clamp = [](float x, float limit) {
     return x < -limit ? -limit : (x > limit ? limit : x);
@@ -121,13 +126,19 @@ Gaussian decode(const HeadDecoding& d, const float* h, const float* texel, float
   for (int k = 0; k < 3; ++k) {
     canonical[k] =
         texel[k] + d.offset_scale_m * (d.max_offset == 0 ? h[k] : clamp(h[k], d.max_offset));
-    scale[k] = extent_m * exp_float(clamp(h[3 + k], d.max_log_scale));
+    scale[k] = extents.spacing_m * exp_float(clamp(h[3 + k], d.max_log_scale));
   }
   const float quaternion[4] = {1.0f + h[6], h[7], h[8], h[9]};
   const std::array<float, 9> rotation = rotation_from_quaternion(quaternion);
   Gaussian gaussian{.position = transform_point(transform, canonical),
                     .factor = {},
                     .opacity = logistic(h[10] + d.opacity_bias)};
+  for (float& own : scale) {
+    if (extents.smallest_m == 0) break;
+    const float wide = std::sqrt(own * own + extents.smallest_m * extents.smallest_m);
+    gaussian.opacity *= own / wide;
+    own = wide;
+  }
   const std::array<float, 12>& m = transform.m;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
@@ -147,6 +158,7 @@ TEST_P(PosedTexels, DecodingIsThatOfTheDefinition) {
     const uint32_t sh_values = 3 * sh_coefficients(decoding.sh_degree);
     kernels::CanonicalBlock texels{};
     kernels::TransformBlock transforms{};
+    kernels::ExtentBlock smallest{};
     std::vector<float> heads(kernels::kLanes * (11 + sh_values));
     for (float& value : heads) value = random.normal() * (round % 3 == 0 ? 20.0f : 1.0f);
     heads[6] = -1, heads[7] = heads[8] = heads[9] = 0;  // no rotation at all
@@ -156,12 +168,14 @@ TEST_P(PosedTexels, DecodingIsThatOfTheDefinition) {
       for (auto& plane : transforms.linear) plane[lane] = random.uniform(-1, 1);
       for (auto& plane : transforms.own_translation_m) plane[lane] = random.uniform(-1, 1);
       texels.extent_m[lane] = random.uniform(0.001f, 0.02f);
+      smallest.smallest_m[lane] = lane % 4 == 0 || round % 5 == 0 ? 0 : random.uniform(1e-9f, 0.1f);
     }
     kernels::GaussianBlock block;
     kernels::DecodeSkinJob job{
         .head = {},
         .taps = nullptr,
         .static_part = nullptr,
+        .smallest = round % 5 == 0 ? nullptr : &smallest,
         .texels = &texels,
         .transforms = &transforms,
         .offset_scale_m = decoding.offset_scale_m,
@@ -181,8 +195,8 @@ TEST_P(PosedTexels, DecodingIsThatOfTheDefinition) {
         for (int k = 0; k < 3; ++k) transform.m[4 * i + k] = transforms.linear[3 * i + k][lane];
         transform.m[4 * i + 3] = transforms.own_translation_m[i][lane];
       }
-      const Gaussian truth =
-          decode(decoding, job.head[0][lane], texel, texels.extent_m[lane], transform);
+      const Gaussian truth = decode(decoding, job.head[0][lane], texel,
+                                    {texels.extent_m[lane], smallest.smallest_m[lane]}, transform);
       for (int k = 0; k < 3; ++k) ASSERT_EQ(block.position_m[k][lane], truth.position[k]);
       for (int k = 0; k < 9; ++k) ASSERT_EQ(block.factor[k][lane], truth.factor[k]);
       ASSERT_EQ(block.opacity[lane], truth.opacity);
@@ -190,6 +204,46 @@ TEST_P(PosedTexels, DecodingIsThatOfTheDefinition) {
         ASSERT_EQ(block.sh[k][lane], job.head[0][lane][11 + k]);
     }
   }
+}
+
+TEST_P(PosedTexels, ASmallestExtentBlursAndKeepsTheWeight) {
+  // Scales of 3, 4 and 12 mm with s = 4 mm: 5, 5.66 and 12.65 mm, volume times opacity as before.
+  constexpr double kScale[3] = {0.003, 0.004, 0.012}, kSmallest = 0.004;
+  kernels::CanonicalBlock texels{};
+  kernels::TransformBlock transforms{};
+  kernels::ExtentBlock smallest{};
+  float head[14] = {};
+  for (int k = 0; k < 3; ++k) head[3 + k] = static_cast<float>(std::log(kScale[k] / 0.01));
+  for (uint32_t lane = 0; lane < kernels::kLanes; ++lane) {
+    texels.extent_m[lane] = 0.01f;
+    smallest.smallest_m[lane] = lane == 0 ? 0 : static_cast<float>(kSmallest);
+    for (int k = 0; k < 9; k += 4) transforms.linear[k][lane] = 1;
+  }
+  kernels::GaussianBlock block;
+  kernels::DecodeSkinJob job{.head = {},
+                             .taps = nullptr,
+                             .static_part = nullptr,
+                             .smallest = &smallest,
+                             .texels = &texels,
+                             .transforms = &transforms,
+                             .offset_scale_m = 1,
+                             .max_offset = INFINITY,
+                             .max_log_scale = 4,
+                             .opacity_bias = 0,
+                             .sh_values = 3,
+                             .gaussians = &block};
+  std::fill_n(job.head[0], kernels::kLanes, head);
+  kernels().decode_skin(job);
+  double volume = 1, weight = 0.5;
+  for (int k = 0; k < 3; ++k) {
+    const double wide = std::sqrt(kScale[k] * kScale[k] + kSmallest * kSmallest);
+    EXPECT_NEAR(block.factor[4 * k][0], kScale[k], 1e-8) << "without one, as it was";
+    EXPECT_NEAR(block.factor[4 * k][1], wide, 1e-8);
+    weight *= kScale[k];
+    volume *= block.factor[4 * k][1];
+  }
+  EXPECT_EQ(block.opacity[0], 0.5f);
+  EXPECT_NEAR(block.opacity[1] * volume, weight, 1e-6 * weight);
 }
 
 INSTANTIATE_TEST_SUITE_P(Isas, PosedTexels,

@@ -87,13 +87,23 @@ TEST(Visibility, NothingThatProjectionSeesIsLeftOut) {
     }
     const Camera camera = camera_at(random.uniform(0.5f, 5), 16 + round % 100);
     const kernels::View view = view_of(camera);
-    const bool may = may_be_seen(place.texels, place.transforms, bounds_of(kBounded), view);
+    kernels::ExtentBlock smallest{};
+    float largest_m = 0;
+    if (round % 2 == 1) {  // up to twenty times what a texel's own Gaussian is
+      for (float& s : smallest.smallest_m) {
+        s = random.uniform(0, 0.1f);
+        largest_m = std::max(largest_m, s);
+      }
+    }
+    const bool may =
+        may_be_seen(place.texels, place.transforms, bounds_of(kBounded, largest_m), view);
     left_out += may ? 0 : 1;
     kernels::GaussianBlock block;
     float heads[kernels::kLanes][14];
     kernels::DecodeSkinJob job{.head = {},
                                .taps = nullptr,
                                .static_part = nullptr,
+                               .smallest = round % 2 == 1 ? &smallest : nullptr,
                                .texels = &place.texels,
                                .transforms = &place.transforms,
                                .offset_scale_m = kBounded.offset_scale_m,
@@ -116,6 +126,7 @@ TEST(Visibility, NothingThatProjectionSeesIsLeftOut) {
          .count = kernels::kLanes,
          .sh_degree = 0,
          .leave_out = kernels::kLeaveOutTransparent | kernels::kLeaveOutOutside,
+         .antialiased = 0,
          .splats = splats,
          .depth_m = depth_m});
     projected_seen += lanes.visible != 0 ? 1 : 0;

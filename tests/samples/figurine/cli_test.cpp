@@ -299,6 +299,31 @@ TEST_F(Cli, ExportedGaussiansGiveTheSamePicture) {
   EXPECT_GE(error.psnr_db(), 80);
 }
 
+// Smallest extents are in the file; antialiasing is the reader's to ask for, as the comment says.
+TEST_F(Cli, ExportedGaussiansWithFiltersGiveTheSamePicture) {
+  folder_.write("c.json",
+                R"({"width": 48, "height": 48, "intrinsics": [[60, 0, 24], [0, 60, 24], [0, 0, 1]],
+          "world_to_camera": [[1, 0, 0, 0], [0, -1, 0, 0.5], [0, 0, -1, 3]]})");
+  ASSERT_EQ(run("render P/filtered.fgn --camera c.json -o a.pfm").exit_code, 0);
+  ASSERT_EQ(run("render P/avatar.fgn --camera c.json -o plain.pfm").exit_code, 0);
+  const ProgramRun exported = run("export P/filtered.fgn --json -o x.ply");
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_EQ(Json::parse(exported.out)["antialiased"], true);
+  EXPECT_NE(folder_.read("x.ply").find("\ncomment antialiased: "), std::string::npos);
+  ASSERT_EQ(run("splat x.ply --camera c.json --antialiased -o b.pfm").exit_code, 0);
+  ASSERT_EQ(run("splat x.ply --camera c.json -o without.pfm").exit_code, 0);
+  samples::ErrorSum with, without, plain;
+  samples::add_foreground_error(pfm("a.pfm"), pfm("b.pfm"), with);
+  samples::add_foreground_error(pfm("a.pfm"), pfm("without.pfm"), without);
+  samples::add_foreground_error(pfm("a.pfm"), pfm("plain.pfm"), plain);
+  std::printf("with %.2f dB, without --antialiased %.2f dB, without filters %.2f dB\n",
+              with.psnr_db(), without.psnr_db(), plain.psnr_db());
+  EXPECT_GT(with.values, 200u);
+  EXPECT_GE(with.psnr_db(), 80);
+  EXPECT_LT(without.psnr_db(), 60);
+  EXPECT_LT(plain.psnr_db(), 60);
+}
+
 TEST_F(Cli, SplatsAScene) {
   const ProgramRun result = run("splat P/scene.ply --size 80x60 --json -o x.png");
   ASSERT_EQ(result.exit_code, 0) << result.err;

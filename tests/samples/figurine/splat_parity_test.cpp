@@ -35,30 +35,32 @@ std::string random_scene() {
                   });
 }
 
-TEST(SplatParity, TwentyThousandGaussiansThroughFiles) {
+// Returns the foreground PSNR.
+double compare_through_files(bool antialiased) {
   const TestFolder folder;
   const std::string ply = random_scene();
   folder.write("scene.ply", ply);
   const ProgramRun run =
-      run_figurine("splat scene.ply --size 256x256 --camera orbit:20,10,3.2,45 --json -o x.pfm",
+      run_figurine("splat scene.ply --size 256x256 --camera orbit:20,10,3.2,45 --json -o x.pfm" +
+                       std::string(antialiased ? " --antialiased" : ""),
                    {.folder = folder.path()});
-  ASSERT_EQ(run.exit_code, 0) << run.err;
+  FIG_CHECK(run.exit_code == 0, run.err.c_str());
   const std::string pfm = folder.read("x.pfm");
   const Result<ports::ImageF32> picture = ports::decode_pfm(std::as_bytes(std::span(pfm)), "x.pfm");
-  ASSERT_TRUE(picture.ok()) << picture.status().message();
-  ASSERT_EQ(picture->channels, 4u);
+  FIG_CHECK(picture.ok() && picture->channels == 4, "a picture with alpha");
 
   // The oracle sees what the file says and the camera that the program says it used.
   const Result<samples::GaussianCloud> cloud =
       samples::read_gaussian_ply(std::as_bytes(std::span(ply)), "scene.ply");
-  ASSERT_TRUE(cloud.ok());
-  ASSERT_EQ(cloud->count(), 20000u);
-  const nlohmann::json json = nlohmann::json::parse(run.out)["camera"];
+  FIG_CHECK(cloud.ok() && cloud->count() == 20000, "the scene as it was written");
+  const nlohmann::json said = nlohmann::json::parse(run.out), json = said["camera"];
+  EXPECT_EQ(said["antialiased"], antialiased);
   Camera camera{.width_px = 256, .height_px = 256, .near_m = json["near"]};
   camera.fx_px = json["intrinsics"][0][0], camera.cx_px = json["intrinsics"][0][2];
   camera.fy_px = json["intrinsics"][1][1], camera.cy_px = json["intrinsics"][1][2];
   for (int k = 0; k < 12; ++k) camera.view_from_world[k] = json["world_to_camera"][k / 4][k % 4];
-  const oracle::Image truth = oracle::render(oracle::from_view(cloud->view()), camera);
+  const oracle::Image truth =
+      oracle::render(oracle::from_view(cloud->view()), camera, {.antialiased = antialiased});
 
   std::vector<float> premultiplied = picture->pixels;
   double largest = 0;
@@ -71,11 +73,18 @@ TEST(SplatParity, TwentyThousandGaussiansThroughFiles) {
     foreground += truth.alpha(p) > 0.5;
   }
   const double psnr_db = oracle::foreground_psnr_db<float>(truth, premultiplied);
-  std::printf("splat_oracle_db %.2f\n%zu foreground pixels of %zu, largest difference %.3g\n",
-              psnr_db, foreground, truth.transmittance.size(), largest);
+  std::printf("%s %.2f\n%zu foreground pixels of %zu, largest difference %.3g\n",
+              antialiased ? "antialiased, dB" : "splat_oracle_db", psnr_db, foreground,
+              truth.transmittance.size(), largest);
   EXPECT_GT(foreground, truth.transmittance.size() / 4);
-  EXPECT_GE(psnr_db, 75);
+  return psnr_db;
 }
+
+TEST(SplatParity, TwentyThousandGaussiansThroughFiles) {
+  EXPECT_GE(compare_through_files(false), 75);
+}
+
+TEST(SplatParity, TheSameAntialiased) { EXPECT_GE(compare_through_files(true), 75); }
 
 }  // namespace
 }  // namespace figurine::tests

@@ -238,6 +238,22 @@ TEST(GaussianPly, WritesTheStandardLayout) {
     ASSERT_NE(found, std::string::npos) << property;
     at = found;
   }
+  EXPECT_EQ(text.find("comment"), std::string::npos);
+}
+
+TEST(GaussianPly, WritesCommentsThatReadersSkip) {
+  const GaussianCloud cloud{.position_m = {1, 2, 3},
+                            .covariance_factor = {0.1f, 0, 0, 0, 0.1f, 0, 0, 0, 0.1f},
+                            .opacity = {0.5f},
+                            .sh = {1, 2, 3}};
+  const std::vector<std::byte> bytes =
+      write_gaussian_ply(cloud.view(), {"one", "property float y"});
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  EXPECT_NE(text.find("1.0\ncomment one\ncomment property float y\nelement vertex 1\n"),
+            std::string::npos);
+  const GaussianCloud back = read_sound(text);
+  EXPECT_EQ(back.position_m, cloud.position_m);
+  EXPECT_EQ(back.sh, cloud.sh);
 }
 
 }  // namespace

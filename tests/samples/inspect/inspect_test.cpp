@@ -72,8 +72,8 @@ void expect_refused(const Outcome& run, const std::string& words) {
 
 TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
   for (const std::string kind :
-       {"body", "avatar", "fixed_point_avatar", "static_avatar", "static_only_avatar", "motion",
-        "population", "half_population", "sampler"}) {
+       {"body", "avatar", "fixed_point_avatar", "static_avatar", "static_only_avatar",
+        "filtered_avatar", "motion", "population", "half_population", "sampler"}) {
     const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");
@@ -127,6 +127,11 @@ TEST(Inspect, SaysWhatTakesHowManyBytes) {
     EXPECT_TRUE(contains(only.out, words)) << words << "\n" << only.out;
   EXPECT_FALSE(contains(only.out, "network in"));
   EXPECT_TRUE(contains(inspect("avatar_v1.fgn").out, "static part       none"));
+  const Outcome filtered = inspect("filtered_avatar_v1.fgn");
+  for (const char* words :
+       {"smallest extents                5", "smallest extents  0.00 to 1.95 mm, 5 bytes",
+        "antialiased       yes", "required 0xc"})
+    EXPECT_TRUE(contains(filtered.out, words)) << words << "\n" << filtered.out;
   EXPECT_TRUE(contains(inspect("fixed_point_avatar_v1.fgn").out, "network in fixed point"));
 }
 

@@ -89,7 +89,8 @@ inline std::vector<double> random_weights(size_t count) {
 }
 
 // Gaussians in world space: position, covariance factor, opacity, SH.
-inline GradientErrors check_splat_gradients(uint32_t sh_degree, uint32_t count) {
+inline GradientErrors check_splat_gradients(uint32_t sh_degree, uint32_t count,
+                                            bool antialiased = false) {
   model::GaussianBuffer<double> gaussians =
       to_buffer<double>(random_gaussians({.count = count,
                                           .sh_degree = sh_degree,
@@ -99,7 +100,7 @@ inline GradientErrors check_splat_gradients(uint32_t sh_degree, uint32_t count) 
                                           .seed = 40 + sh_degree}));
   const Camera camera = test_camera(64);
   const model::PixelRect crop{.x = 3, .y = 5, .width = 58, .height = 55};
-  model::Splatter<double> splatter({.threads = 1});
+  model::Splatter<double> splatter({.threads = 1, .antialiased = antialiased});
   const std::function<std::vector<double>()> render = [&] {
     return splat(splatter, gaussians, camera, crop);
   };

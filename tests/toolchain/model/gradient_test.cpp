@@ -33,6 +33,12 @@ TEST(SplatGradients, EqualFiniteDifferencesForEveryShDegree) {
     expect_small(testing::check_splat_gradients(degree, 120), degree);
 }
 
+// Deviations are around a pixel, so that what the dilation takes from opacities changes steeply.
+TEST(SplatGradients, AntialiasedEqualFiniteDifferences) {
+  for (uint32_t degree : {0u, 1u})
+    expect_small(testing::check_splat_gradients(degree, 120, true), degree);
+}
+
 TEST(HeadGradients, EqualFiniteDifferencesThroughSkinningAndSplatting) {
   for (uint32_t degree : {0u, 3u}) expect_small(testing::check_head_gradients(degree), degree);
 }

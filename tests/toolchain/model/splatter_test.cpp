@@ -110,6 +110,34 @@ TEST(Splatter, DoubleEqualsTheOracle) {
   }
 }
 
+TEST(Splatter, AntialiasedDoubleEqualsTheOracle) {
+  for (const double scale_m : {0.03, 0.003}) {
+    oracle::Gaussians scene = testing::random_gaussians({.count = 2000,
+                                                         .scale_m = scale_m,
+                                                         .scale_spread = 1.5,
+                                                         .low_opacity = 0.9,
+                                                         .high_opacity = 1,
+                                                         .seed = 15});
+    std::fill_n(&scene.covariance_factor[9 * 4], 9, 0.0);  // a point: vanishes
+    const Camera camera = testing::test_camera(128);
+    const oracle::Image truth = oracle::render(scene, camera, {.antialiased = true});
+    Splatter<double> splatter({.threads = 2, .antialiased = true});
+    const std::vector<double> image =
+        testing::splat(splatter, testing::to_buffer<double>(scene), camera, {0, 0, 128, 128});
+    double largest = 0, most = 0;
+    constexpr size_t kPixels = 128 * 128;
+    for (size_t i = 0; i < kPixels; ++i) {
+      for (size_t c = 0; c < 3; ++c)
+        largest = std::max(largest, std::abs(image[c * kPixels + i] - truth.rgb[3 * i + c]));
+      largest = std::max(largest, std::abs(image[3 * kPixels + i] - truth.alpha(i)));
+      most = std::max(most, truth.alpha(i));
+    }
+    std::printf("scale %g m: largest error %.3g, largest alpha %.3g\n", scale_m, largest, most);
+    EXPECT_LT(largest, 1e-11);
+    EXPECT_GT(most, 0.3);
+  }
+}
+
 TEST(Splatter, FloatIsWithin75DecibelsOfTheOracle) {
   // 20,000 Gaussians, degree 3: the target of the project, here at 256x256 to stay within seconds.
   const oracle::Gaussians scene =
