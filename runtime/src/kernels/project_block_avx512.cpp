@@ -1,0 +1,17 @@
+// Projection in lanes, sixteen Gaussians at once.
+#include <immintrin.h>
+
+#include "runtime/src/kernels/kernel.h"
+
+namespace figurine::kernels {
+namespace {
+
+#include "runtime/src/kernels/lanes_avx512.inc"
+
+#include "runtime/src/kernels/project_lanes.inc"
+
+}  // namespace
+
+ProjectedLanes project_block_avx512(const ProjectJob& job) { return project_in_lanes(job); }
+
+}  // namespace figurine::kernels
