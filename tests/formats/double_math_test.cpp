@@ -8,7 +8,7 @@
 
 #include "tests/largest_error.h"
 
-namespace figurine {
+namespace figurine::double_math_test {
 namespace {
 
 constexpr int kSamples = 400'000;
@@ -100,4 +100,4 @@ TEST(DoubleMath, SineAndCosineErrorsAreWithinTheirStatement) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::double_math_test

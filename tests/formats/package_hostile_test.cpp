@@ -9,7 +9,7 @@
 #include "formats/package_samples.h"
 #include "formats/writer/package_parts.h"
 
-namespace figurine {
+namespace figurine::package_hostile_test {
 namespace {
 
 using samples::ExactBytes;
@@ -356,4 +356,4 @@ TEST(PackageLimits, RejectsIndicesThatCostTooMuch) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::package_hostile_test

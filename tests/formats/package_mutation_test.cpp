@@ -12,7 +12,7 @@
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
 
-namespace figurine {
+namespace figurine::package_mutation_test {
 namespace {
 
 using samples::GuardedBytes;
@@ -155,4 +155,4 @@ TEST_P(PackageMutation, NeverBreaksAPromise) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::package_mutation_test

@@ -9,7 +9,7 @@
 #include "largest_error.h"
 #include "runtime/splat_scene.h"
 
-namespace figurine {
+namespace figurine::splat_closed_form_test {
 namespace {
 
 using tests::FloatImage;
@@ -316,4 +316,4 @@ TEST(SplatClosedForm, FieldsOfViewOf1And170Degrees) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::splat_closed_form_test

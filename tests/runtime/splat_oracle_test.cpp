@@ -10,7 +10,7 @@
 #include "largest_error.h"
 #include "runtime/splat_scene.h"
 
-namespace figurine {
+namespace figurine::splat_oracle_test {
 namespace {
 
 using tests::FloatImage;
@@ -158,4 +158,4 @@ TEST(SplatOracle, TheCropOfAnImageIsThatPartOfIt) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::splat_oracle_test

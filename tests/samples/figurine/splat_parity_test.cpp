@@ -14,7 +14,7 @@
 #include "samples/ply_text.h"
 #include "samples/program.h"
 
-namespace figurine::tests {
+namespace figurine::tests::splat_parity_test {
 namespace {
 
 // 20,000 Gaussians with SH 3 before the camera: balls, discs and needles of 2 mm to 60 mm,
@@ -78,4 +78,4 @@ TEST(SplatParity, TwentyThousandGaussiansThroughFiles) {
 }
 
 }  // namespace
-}  // namespace figurine::tests
+}  // namespace figurine::tests::splat_parity_test
