@@ -93,7 +93,7 @@ function(figurine_test_program name)
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest GTest::gtest_main)
   target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}" "${PROJECT_SOURCE_DIR}/tests")
   target_compile_definitions(${name} PRIVATE FIGURINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
-    ${arg_DEFINITIONS})
+    ${arg_DEFINITIONS} $<$<BOOL:${CMAKE_CROSSCOMPILING}>:FIGURINE_EMULATED>)
   target_compile_options(${name} PRIVATE -fPIC)  # as the owners of precompiled headers, not -fPIE
   set_target_properties(${name} PROPERTIES UNITY_BUILD_BATCH_SIZE 16)
   if(arg_TENSORS)
