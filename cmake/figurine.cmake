@@ -79,31 +79,109 @@ endfunction()
 # the CPU time.
 set(FIGURINE_TEST_ENVIRONMENT "OMP_NUM_THREADS=1" "OMP_WAIT_POLICY=passive")
 
-# figurine_test(NAME SOURCES... LIBRARIES...): a GoogleTest program, one ctest entry. Running no
-# test is a failure. NOT_EMULATED names the tests (SUITE.NAME) that a cross build leaves out, with
-# the reason beside them. TENSORS: its files compute with LibTorch's tensors, and are compiled with
-# figurine_model's precompiled header in place of GoogleTest's.
-function(figurine_test name)
-  cmake_parse_arguments(arg "TENSORS" "" "SOURCES;LIBRARIES;DEFINITIONS;LABELS;NOT_EMULATED"
-    ${ARGN})
-  add_executable(${name} ${arg_SOURCES})
-  set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)  # their helpers are called alike
+# What takes time in a test is in the libraries. For the owner of the tests' precompiled header too:
+# GCC takes one only where both are optimised alike.
+set(FIGURINE_TEST_OPTIONS $<$<NOT:$<CONFIG:Debug>>:-O1>)
+
+# figurine_test_program(NAME LIBRARIES...): a GoogleTest program for several figurine_test(... IN
+# NAME), whose files are compiled together and linked once. TENSORS: its files compute with
+# LibTorch's tensors, and are compiled with figurine_model's precompiled header in place of
+# GoogleTest's.
+function(figurine_test_program name)
+  cmake_parse_arguments(arg "TENSORS" "" "LIBRARIES;DEFINITIONS" ${ARGN})
+  add_executable(${name})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest GTest::gtest_main)
   target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}" "${PROJECT_SOURCE_DIR}/tests")
   target_compile_definitions(${name} PRIVATE FIGURINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
-    ${arg_DEFINITIONS})
+    ${arg_DEFINITIONS} $<$<BOOL:${CMAKE_CROSSCOMPILING}>:FIGURINE_EMULATED>)
   target_compile_options(${name} PRIVATE -fPIC)  # as the owners of precompiled headers, not -fPIE
+  set_target_properties(${name} PROPERTIES UNITY_BUILD_BATCH_SIZE 16)
   if(arg_TENSORS)
     target_precompile_headers(${name} REUSE_FROM figurine_model)
   else()
+    target_compile_options(${name} PRIVATE ${FIGURINE_TEST_OPTIONS})
     target_precompile_headers(${name} REUSE_FROM figurine_test_header)
   endif()
+endfunction()
+
+# figurine_test_suites(VARIABLE SOURCE...): what --gtest_filter takes for the tests of these files.
+# CMake runs again when one of them changes.
+function(figurine_test_suites variable)
+  set(patterns)
+  foreach(source ${ARGN})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${source}")
+    file(READ "${source}" text)
+    string(REGEX MATCHALL "\n *TEST(_F)?\\([A-Za-z0-9_]+" tests "${text}")
+    list(TRANSFORM tests REPLACE "^.*\\((.*)$" "\\1.*")
+    string(REGEX MATCHALL "\nINSTANTIATE_TEST_SUITE_P\\([A-Za-z0-9_]+,[ \n]*[A-Za-z0-9_]+"
+      instances "${text}")
+    list(TRANSFORM instances REPLACE "^.*\\(([A-Za-z0-9_]+),[ \n]*([A-Za-z0-9_]+)$" "\\1/\\2.*")
+    list(APPEND patterns ${tests} ${instances})
+    # What is not found by the above would never run.
+    if(text MATCHES "TYPED_TEST|\n +(TEST_P|INSTANTIATE_)")
+      message(FATAL_ERROR
+        "${source}: write '${CMAKE_MATCH_0}' otherwise, or in a program of its own")
+    endif()
+    string(REGEX MATCHALL "\nTEST_P\\([A-Za-z0-9_]+" parametric "${text}")
+    foreach(suite ${parametric})
+      string(REGEX REPLACE "^.*\\(" "/" suite "${suite}")
+      if(NOT "${instances}" MATCHES "${suite}\\.")
+        message(FATAL_ERROR "${source}: nothing instantiates ${suite}")
+      endif()
+    endforeach()
+  endforeach()
+  list(REMOVE_DUPLICATES patterns)
+  if(NOT patterns)
+    message(FATAL_ERROR "no test in ${ARGN}")
+  endif()
+  set(${variable} ${patterns} PARENT_SCOPE)
+endfunction()
+
+# figurine_test(NAME SOURCES... LIBRARIES...): a ctest entry and its GoogleTest program. Running no
+# test is a failure. IN names a figurine_test_program: the sources become part of it, the entry runs
+# their suites alone, which no other entry may have, and the target NAME builds the program. A file
+# of a program with several has its own namespace, because their helpers are called alike.
+# NOT_EMULATED names the tests (SUITE.NAME) that a cross build leaves out, with the reason beside
+# them.
+function(figurine_test name)
+  cmake_parse_arguments(arg "TENSORS" "IN" "SOURCES;LIBRARIES;DEFINITIONS;LABELS;NOT_EMULATED"
+    ${ARGN})
+  list(TRANSFORM arg_SOURCES PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
   set(filter)
+  if(arg_IN)
+    set(program ${arg_IN})
+    figurine_test_suites(suites ${arg_SOURCES})
+    get_target_property(taken ${program} FIGURINE_TEST_SUITES)
+    foreach(suite ${suites})
+      if(suite IN_LIST taken)
+        message(FATAL_ERROR "${name}: another test of ${program} has the suite ${suite} too")
+      endif()
+    endforeach()
+    set_property(TARGET ${program} APPEND PROPERTY FIGURINE_TEST_SUITES ${suites})
+    target_link_libraries(${program} PRIVATE ${arg_LIBRARIES})
+    target_compile_definitions(${program} PRIVATE ${arg_DEFINITIONS})
+    add_custom_target(${name})
+    add_dependencies(${name} ${program})
+    list(JOIN suites ":" filter)
+  else()
+    set(program ${name})
+    set(tensors)
+    if(arg_TENSORS)
+      set(tensors TENSORS)
+    endif()
+    figurine_test_program(${program} ${tensors} LIBRARIES ${arg_LIBRARIES}
+      DEFINITIONS ${arg_DEFINITIONS})
+    set_target_properties(${program} PROPERTIES UNITY_BUILD OFF)  # their helpers are called alike
+  endif()
+  target_sources(${program} PRIVATE ${arg_SOURCES})
   if(CMAKE_CROSSCOMPILING AND arg_NOT_EMULATED)
     list(JOIN arg_NOT_EMULATED ":" names)
-    set(filter "--gtest_filter=-${names}")
+    string(APPEND filter "-${names}")
   endif()
-  add_test(NAME ${name} COMMAND ${name} ${filter})
+  if(filter)
+    set(filter "--gtest_filter=${filter}")
+  endif()
+  add_test(NAME ${name} COMMAND ${program} ${filter})
   set_tests_properties(${name} PROPERTIES FAIL_REGULAR_EXPRESSION "Running 0 tests"
     LABELS "${arg_LABELS}" ENVIRONMENT "${FIGURINE_TEST_ENVIRONMENT}")
 endfunction()

@@ -10,7 +10,7 @@
 #include "tests/golden/posing/five_texels.h"
 #include "tests/largest_error.h"
 
-namespace figurine {
+namespace figurine::body_test {
 namespace {
 
 using golden::FiveTexels;
@@ -116,4 +116,4 @@ TEST(FourierChannels, OfShippedSizesAreTheTrueValuesRoundedOnce) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::body_test

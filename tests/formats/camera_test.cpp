@@ -8,7 +8,7 @@
 
 #include "tests/largest_error.h"
 
-namespace figurine {
+namespace figurine::camera_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -142,4 +142,4 @@ TEST(ValidateCamera, RejectsEveryUnsoundField) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::camera_test

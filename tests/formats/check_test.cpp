@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <string>
 
-namespace figurine {
+namespace figurine::check_test {
 namespace {
 
 // Leaves with a code of its own when it was told what it should be.
@@ -62,4 +62,4 @@ TEST(Check, WithoutHandlerAgainSpeaksToStderr) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::check_test

@@ -14,7 +14,7 @@
 
 #include "runtime/nn/reference_network.h"
 
-namespace figurine {
+namespace figurine::fixed_point_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -403,4 +403,4 @@ TEST(FixedPointValidation, RefusesAnInputReadByOthersAndAnEndThatIsNoHead) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::fixed_point_test

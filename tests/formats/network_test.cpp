@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace figurine {
+namespace figurine::network_test {
 namespace {
 
 constexpr uint32_t kPaper = 6,
@@ -141,4 +141,4 @@ TEST(InferShapes, HoldsWeightsAgainstTheShape) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::network_test

@@ -11,7 +11,7 @@
 
 #include "tests/largest_error.h"
 
-namespace figurine {
+namespace figurine::noise_level_test {
 namespace {
 
 const uint64_t kDimensions[] = {1, 64, 9'886, 156'000, 598'011};
@@ -156,4 +156,4 @@ TEST(NoiseSchedule, HasTheSameBitsOnEveryCpu) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::noise_level_test

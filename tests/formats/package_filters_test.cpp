@@ -9,7 +9,7 @@
 #include "formats/package_samples.h"
 #include "formats/writer/package_parts.h"
 
-namespace figurine {
+namespace figurine::package_filters_test {
 namespace {
 
 using samples::AvatarSample;
@@ -161,4 +161,4 @@ TEST(PackageFilters, FitTheBodyWhoseTexelsTheyAre) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::package_filters_test

@@ -12,7 +12,7 @@
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
 
-namespace figurine {
+namespace figurine::package_golden_test {
 namespace {
 
 using samples::SampleKind;
@@ -67,4 +67,4 @@ TEST(PackageGolden, TodaysReaderReadsTheGoldenBytes) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::package_golden_test

@@ -11,7 +11,7 @@
 #include "formats/src/package/text.h"
 #include "formats/writer/package_parts.h"
 
-namespace figurine {
+namespace figurine::package_meaning_test {
 namespace {
 
 using samples::AvatarSample;
@@ -258,7 +258,9 @@ TEST(PackageAvatar, RejectsLayersBehindTheWritersBack) {
 
 TEST(PackageAvatar, RejectsFixedPointWhoseArithmeticIsNotDefined) {
   using Bend = std::function<void(FixedPointAvatarSample&)>;
-  const auto bent = [](const Bend& bend) { return ::figurine::bent<FixedPointAvatarSample>(bend); };
+  const auto bent = [](const Bend& bend) {
+    return package_meaning_test::bent<FixedPointAvatarSample>(bend);
+  };
   for (const float scale :
        {0.0f, -0.125f, kNan, kInfinity, std::numeric_limits<float>::denorm_min()}) {
     expect_refused(
@@ -655,4 +657,4 @@ TEST(PackageFit, MotionsHaveTheBodysJoints) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::package_meaning_test

@@ -8,7 +8,7 @@
 #include "formats/opened.h"
 #include "formats/package_samples.h"
 
-namespace figurine {
+namespace figurine::package_roundtrip_test {
 namespace {
 
 using samples::AvatarSample;
@@ -247,4 +247,4 @@ TEST(PackageHash, NamesTheContentAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::package_roundtrip_test

@@ -13,7 +13,7 @@
 #include "formats/package_samples.h"
 #include "formats/writer/package_parts.h"
 
-namespace figurine {
+namespace figurine::package_sampler_test {
 namespace {
 
 using samples::ExactBytes;
@@ -618,4 +618,4 @@ TEST(PackageSampler, SkipsUnknownOptionalBlobsAndRefusesOthersAndFeatures) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::package_sampler_test

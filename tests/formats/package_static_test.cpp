@@ -10,7 +10,7 @@
 #include "formats/package_samples.h"
 #include "formats/writer/package_parts.h"
 
-namespace figurine {
+namespace figurine::package_static_test {
 namespace {
 
 using samples::AvatarSample;
@@ -269,4 +269,4 @@ TEST(PackageStatic, FitsTheBodyWhoseCellsItHas) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::package_static_test

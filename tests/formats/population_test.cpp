@@ -18,7 +18,7 @@
 #include "formats/writer/package_parts.h"
 #include "formats/writer/rans_encoder.h"
 
-namespace figurine {
+namespace figurine::population_test {
 namespace {
 
 using samples::AvatarSample;
@@ -614,4 +614,4 @@ TEST(PackagePopulation, SkipsUnknownOptionalBlobsAndRefusesOthers) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::population_test

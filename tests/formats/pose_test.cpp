@@ -12,7 +12,7 @@
 
 #include "tests/largest_error.h"
 
-namespace figurine {
+namespace figurine::pose_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -286,4 +286,4 @@ TEST(TransformNormal, NearlySingularBlendsGiveUnitLengthOrZero) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::pose_test

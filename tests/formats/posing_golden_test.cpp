@@ -12,7 +12,7 @@
 #include "tests/golden/posing/five_texels.h"
 #include "tests/largest_error.h"
 
-namespace figurine {
+namespace figurine::posing_golden_test {
 namespace {
 
 using golden::FiveTexels;
@@ -103,4 +103,4 @@ TEST(FiveTexelsPosing, MapsHoldStandardisedPositionNormalAndFourierChannels) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::posing_golden_test

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <string>
 
-namespace figurine {
+namespace figurine::sampler_test {
 namespace {
 
 TEST(Sampler, MethodsHaveTheirNames) {
@@ -60,4 +60,4 @@ TEST(DenoiserMatrices, AreInTheOrderOfTheSchema) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::sampler_test

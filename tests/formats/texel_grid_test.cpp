@@ -9,7 +9,7 @@
 #include <numeric>
 #include <string>
 
-namespace figurine {
+namespace figurine::texel_grid_test {
 namespace {
 
 using Rows = std::vector<std::string>;
@@ -310,4 +310,4 @@ TEST(GridTaps, ReproduceALineAcrossAWholeMap) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::texel_grid_test

@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-namespace figurine {
+namespace figurine::ycbcr_test {
 namespace {
 
 // Kr, Kg and Kb in ten-thousandths.
@@ -83,4 +83,4 @@ TEST(Ycbcr, GreysHaveNoColour) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::ycbcr_test

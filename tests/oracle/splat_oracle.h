@@ -180,8 +180,8 @@ struct Options {
   double alpha_cut = kAlphaCut;
   bool antialiased = false;     // opacity sqrt(det / dilated det)
   double doubt = 1e-3;          // relative distance to a threshold within which a pixel is doubtful
-  bool skip_far_pixels = true;  // leave out pixels outside the ellipse's bounding box (they fail
-                                // the alpha cut): only saves time
+  bool skip_far_pixels = true;  // leave out pixels outside the ellipse of the alpha cut (they fail
+                                // it): only saves time
 };
 
 inline Image render(const Gaussians& gaussians, const Camera& camera, const Options& options = {}) {
@@ -200,18 +200,25 @@ inline Image render(const Gaussians& gaussians, const Camera& camera, const Opti
   std::vector<uint8_t> stopped(pixels, 0);
   for (const Splat& splat : splats) {
     if (!(splat.opacity >= options.alpha_cut)) continue;
-    int64_t x0 = 0, x1 = camera.width_px, y0 = 0, y1 = camera.height_px;
-    if (options.skip_far_pixels) {  // generous: two pixels and 1 % beyond where alpha = cut
-      const double reach = 2 * std::log(splat.opacity / options.alpha_cut);
-      const double rx = 1.01 * std::sqrt(reach * splat.a) + 2,
-                   ry = 1.01 * std::sqrt(reach * splat.c) + 2;
-      const auto pixel = [](double value, int64_t limit) {
-        return static_cast<int64_t>(std::clamp(value, 0.0, static_cast<double>(limit)));
-      };
-      x0 = pixel(splat.mean_px[0] - rx, x1), x1 = pixel(splat.mean_px[0] + rx + 1, x1);
+    const auto pixel = [](double value, int64_t limit) {
+      return static_cast<int64_t>(std::clamp(value, 0.0, static_cast<double>(limit)));
+    };
+    // The square of the ellipse where alpha = cut (or would, were it as much less as is in doubt).
+    const double reach = 2 * std::log(splat.opacity / options.alpha_cut) + 4 * options.doubt;
+    int64_t y0 = 0, y1 = camera.height_px;
+    if (options.skip_far_pixels) {  // generous: two pixels and 1 % beyond
+      const double ry = 1.01 * std::sqrt(reach * splat.c) + 2;
       y0 = pixel(splat.mean_px[1] - ry, y1), y1 = pixel(splat.mean_px[1] + ry + 1, y1);
     }
     for (int64_t y = y0; y < y1; ++y) {
+      int64_t x0 = 0, x1 = camera.width_px;
+      if (options.skip_far_pixels) {  // c dx^2 - 2 b dx dy + a dy^2 = reach det, solved for dx
+        const double dy = y + 0.5 - splat.mean_px[1], middle = splat.b * dy / splat.c,
+                     within = std::max(reach - dy * dy / splat.c, 0.0),
+                     rx = 1.01 * std::sqrt(within * splat.determinant / splat.c) + 2;
+        x0 = pixel(splat.mean_px[0] + middle - rx, x1);
+        x1 = pixel(splat.mean_px[0] + middle + rx + 1, x1);
+      }
       for (int64_t x = x0; x < x1; ++x) {
         const size_t pixel = static_cast<size_t>(y) * camera.width_px + static_cast<size_t>(x);
         if (stopped[pixel]) continue;

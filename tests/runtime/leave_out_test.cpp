@@ -9,7 +9,7 @@
 #include "runtime/splat_scene.h"
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::leave_out_test {
 namespace {
 
 using tests::SyntheticBody;
@@ -227,4 +227,4 @@ TEST(RendererIsa, IsWhatWasAskedForOrRefused) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::leave_out_test

@@ -10,7 +10,7 @@
 #include "runtime/splat_scene.h"
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::population_test {
 namespace {
 
 using tests::make_renderer;
@@ -126,4 +126,4 @@ TEST(PopulationMember, NeedsItsBody) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::population_test

@@ -9,7 +9,7 @@
 #include "runtime/splat_scene.h"
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::precision_test {
 namespace {
 
 using tests::Held;
@@ -154,4 +154,4 @@ TEST(FixedPointFrame, DoesNotRememberEarlierOnes) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::precision_test

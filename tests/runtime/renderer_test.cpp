@@ -18,7 +18,7 @@
 #include "runtime/splat_scene.h"
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::renderer_test {
 namespace {
 
 using tests::FloatImage;
@@ -684,4 +684,4 @@ TEST(Renderer, StatisticsCountWhatWasDrawn) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::renderer_test

@@ -9,7 +9,7 @@
 #include "largest_error.h"
 #include "runtime/splat_scene.h"
 
-namespace figurine {
+namespace figurine::splat_closed_form_test {
 namespace {
 
 using tests::FloatImage;
@@ -336,4 +336,4 @@ TEST(SplatClosedForm, AntialiasedWeightIsThatOfTheGaussian) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::splat_closed_form_test

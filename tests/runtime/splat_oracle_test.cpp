@@ -10,7 +10,7 @@
 #include "largest_error.h"
 #include "runtime/splat_scene.h"
 
-namespace figurine {
+namespace figurine::splat_oracle_test {
 namespace {
 
 using tests::FloatImage;
@@ -76,6 +76,29 @@ void expect_close(const Comparison& comparison, double alpha_cut = kAlphaCut) {
   EXPECT_LE(comparison.doubtful, 0.01);
   EXPECT_LE(comparison.flipped, 2e-4);
   EXPECT_GE(comparison.foreground_psnr_db, 100);
+}
+
+TEST(SplatOracle, TheOracleItselfLeavesOutNothingThatIsSeen) {
+  Scene scene = make_random_scene(300, 0, 80);
+  tests::Random random(81);
+  for (int i = 0; i < 60; ++i) {  // needles and discs, some of them across the whole picture
+    const float quaternion[4] = {random.normal(), random.normal(), random.normal(),
+                                 random.normal()};
+    std::array<float, 9> factor = rotation_from_quaternion(quaternion);
+    const float scale[3] = {random.uniform(0.1f, 4), random.uniform(0, 1) < 0.5f ? 1e-4f : 1.0f,
+                            1e-6f};
+    for (int k = 0; k < 9; ++k) factor[k] *= scale[k % 3];
+    scene.add({random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(2, 4)}, factor,
+              i % 3 == 0 ? 1.0001f * static_cast<float>(kAlphaCut) : random.uniform(0.01f, 1),
+              {1, 1, 1});
+  }
+  const Camera camera = tests::front_camera(61, 53, 50);
+  const oracle::Gaussians gaussians = oracle::from_view(scene.view());
+  const oracle::Image brief = oracle::render(gaussians, camera),
+                      whole = oracle::render(gaussians, camera, {.skip_far_pixels = false});
+  EXPECT_EQ(brief.rgb, whole.rgb);
+  EXPECT_EQ(brief.transmittance, whole.transmittance);
+  EXPECT_EQ(brief.doubtful, whole.doubtful);
 }
 
 TEST(SplatOracle, EveryShDegree) {
@@ -169,4 +192,4 @@ TEST(SplatOracle, TheCropOfAnImageIsThatPartOfIt) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::splat_oracle_test

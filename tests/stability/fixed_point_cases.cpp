@@ -16,6 +16,7 @@
 #include "tests/stability/scene.h"
 
 namespace figurine::stability {
+namespace fixed_point {
 namespace {
 
 using tests::RandomFixedPointNetwork;
@@ -258,7 +259,8 @@ constexpr Case kCases[] = {{"FixedPointSaturation", saturation},
                            {"FixedPointUnsoundNetworks", unsound_networks}};
 
 }  // namespace
+}  // namespace fixed_point
 
-std::span<const Case> fixed_point_cases() { return kCases; }
+std::span<const Case> fixed_point_cases() { return fixed_point::kCases; }
 
 }  // namespace figurine::stability

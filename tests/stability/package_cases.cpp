@@ -10,6 +10,7 @@
 #include "tests/stability/rows.h"
 
 namespace figurine::stability {
+namespace package {
 namespace {
 
 using golden::five_texels_avatar;
@@ -135,7 +136,8 @@ constexpr Case kCases[] = {{"UnsoundNumbers", unsound_numbers},
                            {"OddButSoundNumbers", odd_but_sound_numbers}};
 
 }  // namespace
+}  // namespace package
 
-std::span<const Case> package_cases() { return kCases; }
+std::span<const Case> package_cases() { return package::kCases; }
 
 }  // namespace figurine::stability

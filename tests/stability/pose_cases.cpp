@@ -12,6 +12,7 @@
 #include "tests/stability/scene.h"
 
 namespace figurine::stability {
+namespace pose {
 namespace {
 
 using golden::FiveTexels;
@@ -54,7 +55,7 @@ struct PoseError {
   double centre_m = 0, factor = 0;
   size_t not_finite = 0;
   void add(const FiveTexels& example, const GaussianView& view, const PoseView& pose) {
-    not_finite += stability::not_finite(view);
+    not_finite += pose::not_finite(view);
     const std::vector<Gaussian64> expected = pose_five_texels(example, pose);
     for (size_t i = 0; i < expected.size(); ++i) {
       double size = 0;
@@ -292,7 +293,8 @@ constexpr Case kCases[] = {{"Twists180", twists},
                            {"SmallestExtents", smallest_extents}};
 
 }  // namespace
+}  // namespace pose
 
-std::span<const Case> pose_cases() { return kCases; }
+std::span<const Case> pose_cases() { return pose::kCases; }
 
 }  // namespace figurine::stability

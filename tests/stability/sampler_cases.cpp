@@ -14,6 +14,7 @@
 
 namespace figurine::stability {
 
+namespace sampler {
 namespace {
 
 using tests::RandomSampler;
@@ -131,7 +132,8 @@ constexpr Case kCases[] = {{"SamplerRequests", every_request},
                            {"SamplerOutliers", outliers_among_activations}};
 
 }  // namespace
+}  // namespace sampler
 
-std::span<const Case> sampler_cases() { return kCases; }
+std::span<const Case> sampler_cases() { return sampler::kCases; }
 
 }  // namespace figurine::stability

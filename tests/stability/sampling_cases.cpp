@@ -15,6 +15,7 @@ namespace figurine::stability {
 Rows posterior_at_extreme_levels();  // posterior_cases.cpp
 #endif
 
+namespace sampling {
 namespace {
 
 constexpr size_t kValues = 4096;
@@ -153,7 +154,8 @@ constexpr Case kCases[] = {{"SamplingTerminalSnr", terminal_snr},
                            {"SamplingPureNoise", first_step_from_pure_noise}};
 
 }  // namespace
+}  // namespace sampling
 
-std::span<const Case> sampling_cases() { return kCases; }
+std::span<const Case> sampling_cases() { return sampling::kCases; }
 
 }  // namespace figurine::stability

@@ -9,6 +9,7 @@
 #include "tests/stability/scene.h"
 
 namespace figurine::stability {
+namespace splat {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -438,7 +439,8 @@ constexpr Case kCases[] = {{"NearSingularCovariances", near_singular},
                            {"OrderAndThreads", order}};
 
 }  // namespace
+}  // namespace splat
 
-std::span<const Case> splat_cases() { return kCases; }
+std::span<const Case> splat_cases() { return splat::kCases; }
 
 }  // namespace figurine::stability

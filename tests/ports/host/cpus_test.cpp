@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace figurine::ports {
+namespace figurine::ports::cpus_test {
 namespace {
 
 class Quota : public testing::Test {
@@ -65,4 +65,4 @@ TEST(UsableCpus, AreAtLeastOneAndWithinTheAffinityMask) {
 }
 
 }  // namespace
-}  // namespace figurine::ports
+}  // namespace figurine::ports::cpus_test

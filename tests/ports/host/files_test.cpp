@@ -14,7 +14,7 @@
 
 #include "ports/host/folder_lock.h"
 
-namespace figurine::ports {
+namespace figurine::ports::files_test {
 namespace {
 
 class Files : public testing::Test {
@@ -139,4 +139,4 @@ TEST_F(Files, WriteIntoMissingFolderLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace figurine::ports
+}  // namespace figurine::ports::files_test

@@ -11,7 +11,7 @@
 #include "ports/media/pfm.h"
 #include "ports/media/png.h"
 
-namespace figurine::ports {
+namespace figurine::ports::image_test {
 namespace {
 
 std::span<const std::byte> bytes_of(const std::string& text) {
@@ -158,4 +158,4 @@ TEST(Pfm, BrokenFilesAreErrors) {
 }
 
 }  // namespace
-}  // namespace figurine::ports
+}  // namespace figurine::ports::image_test

@@ -15,7 +15,7 @@
 #include "ports/host/atomic_file.h"
 #include "ports/media/y4m.h"
 
-namespace figurine::ports {
+namespace figurine::ports::video_test {
 namespace {
 
 class Folder {
@@ -223,4 +223,4 @@ TEST(AtomicFile, SaysWhyItCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace figurine::ports
+}  // namespace figurine::ports::video_test

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace figurine::ports {
+namespace figurine::ports::yuv_test {
 namespace {
 
 constexpr YcbcrMatrix k601 = YcbcrMatrix::kBt601, k709 = YcbcrMatrix::kBt709;
@@ -78,4 +78,4 @@ TEST(YuvRowsDeathTest, RefusesRowsOfOtherSizes) {
 }
 
 }  // namespace
-}  // namespace figurine::ports
+}  // namespace figurine::ports::yuv_test

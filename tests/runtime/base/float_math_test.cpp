@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace figurine {
+namespace figurine::float_math_test {
 namespace {
 
 // Every stride-th float of [low, high], by bits; both ends of one sign. The stride is a prime, so
@@ -116,4 +116,4 @@ TEST(FloatMath, Log2ErrorIsWithinItsStatement) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::float_math_test

@@ -8,7 +8,7 @@
 
 #include "runtime/src/kernels/table.h"
 
-namespace figurine {
+namespace figurine::blend_tile_test {
 namespace {
 
 using kernels::kTileSize;
@@ -170,4 +170,4 @@ INSTANTIATE_TEST_SUITE_P(Isas, BlendTile,
                          [](const auto& of) { return std::string(to_string(of.param)); });
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::blend_tile_test

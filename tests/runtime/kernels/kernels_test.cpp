@@ -8,13 +8,13 @@
 #include "runtime/kernels/random_jobs.h"
 #include "runtime/src/kernels/table.h"
 
-namespace figurine {
-namespace kernels {
+namespace figurine::kernels {
 #define FIG_KERNEL(Type, operation, isa) Type operation##_##isa;
 #include "runtime/src/kernels/kernels.inc"
 #undef FIG_KERNEL
-}  // namespace kernels
+}  // namespace figurine::kernels
 
+namespace figurine::kernels_test {
 namespace {
 
 std::set<Isa>& ran() {
@@ -91,4 +91,4 @@ TEST(KernelTables, NamesAndInstructionSetsCorrespond) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::kernels_test

@@ -8,7 +8,7 @@
 #include "runtime/src/kernels/table.h"
 #include "runtime/src/splat/view.h"
 
-namespace figurine {
+namespace figurine::project_block_test {
 namespace {
 
 using kernels::GaussianBlock;
@@ -176,4 +176,4 @@ INSTANTIATE_TEST_SUITE_P(Isas, ProjectBlock,
                          [](const auto& of) { return std::string(to_string(of.param)); });
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::project_block_test

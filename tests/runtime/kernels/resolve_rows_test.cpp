@@ -8,7 +8,7 @@
 
 #include "runtime/src/kernels/table.h"
 
-namespace figurine {
+namespace figurine::resolve_rows_test {
 namespace {
 
 using kernels::TilePixels;
@@ -86,4 +86,4 @@ INSTANTIATE_TEST_SUITE_P(Isas, ResolveRows,
                          [](const auto& of) { return std::string(to_string(of.param)); });
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::resolve_rows_test

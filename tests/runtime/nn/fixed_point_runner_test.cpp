@@ -12,7 +12,7 @@
 
 #include "runtime/nn/fixed_point_networks.h"
 
-namespace figurine {
+namespace figurine::fixed_point_runner_test {
 namespace {
 
 using tests::RandomFixedPointNetwork;
@@ -289,4 +289,4 @@ TEST(FixedPointRunner, RefusesNetworksThatAreNotDefined) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::fixed_point_runner_test

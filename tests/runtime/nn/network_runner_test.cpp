@@ -11,7 +11,7 @@
 #include "runtime/nn/reference_network.h"
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::network_runner_test {
 namespace {
 
 using tests::Random;
@@ -200,4 +200,4 @@ TEST(NetworkRunner, RefusesWeightsThatDoNotFit) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::network_runner_test

@@ -21,7 +21,7 @@
 #include "runtime/src/splat/view.h"
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::composed_avatar_test {
 namespace {
 
 using kernels::kLanes;
@@ -473,4 +473,4 @@ TEST(ComposedAvatarsThatDoNotFit, AreRefusedByReason) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::composed_avatar_test

@@ -15,7 +15,7 @@
 #include "runtime/src/pose/transforms.h"
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::posed_texels_test {
 namespace {
 
 using tests::SyntheticBody;
@@ -251,4 +251,4 @@ INSTANTIATE_TEST_SUITE_P(Isas, PosedTexels,
                          [](const auto& of) { return std::string(to_string(of.param)); });
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::posed_texels_test

@@ -10,7 +10,7 @@
 #include "runtime/src/splat/view.h"
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::visibility_test {
 namespace {
 
 constexpr HeadDecoding kBounded{.max_log_scale = 1, .max_offset = 1};
@@ -137,4 +137,4 @@ TEST(Visibility, NothingThatProjectionSeesIsLeftOut) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::visibility_test

@@ -18,7 +18,7 @@
 #include "runtime/src/sample/integer_linear.h"
 #include "runtime/src/sample/weight_decoder.h"
 
-namespace figurine {
+namespace figurine::device_sampler_test {
 namespace {
 
 using tests::RandomSampler;
@@ -487,4 +487,4 @@ TEST_F(AvatarSamplerTest, EveryCpuHasTheseBits) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::device_sampler_test

@@ -12,7 +12,7 @@
 
 #include "tests/largest_error.h"
 
-namespace figurine {
+namespace figurine::noise_test {
 namespace {
 
 using Words = std::array<uint32_t, 4>;
@@ -145,4 +145,4 @@ TEST(FillNormal, HasTheSameBitsOnEveryCpu) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::noise_test

@@ -11,7 +11,7 @@
 
 #include "runtime/src/sample/noise.h"
 
-namespace figurine {
+namespace figurine::solver_test {
 namespace {
 
 constexpr SolverMethod kMethods[] = {SolverMethod::kDdim, SolverMethod::kDpmSolverPlusPlus2M};
@@ -269,4 +269,4 @@ TEST(Solver, HasTheSameBitsOnEveryCpu) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::solver_test

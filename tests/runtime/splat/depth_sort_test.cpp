@@ -8,7 +8,7 @@
 
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::depth_sort_test {
 namespace {
 
 std::vector<DepthSort::Item> sorted(const std::vector<float>& depths, uint32_t threads) {
@@ -67,4 +67,4 @@ TEST(DepthSort, EqualDepthsKeepTheirOrder) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::depth_sort_test

@@ -8,7 +8,7 @@
 #include "figurine/ycbcr.h"
 #include "runtime/splat_scene.h"
 
-namespace figurine::tests {
+namespace figurine::tests::pixel_layout_test {
 namespace {
 
 constexpr uint8_t kUntouched = 0xA5;
@@ -252,4 +252,4 @@ TEST(PixelFormatsNv12, ChromaMayFollowLumaAtOnce) {
 }
 
 }  // namespace
-}  // namespace figurine::tests
+}  // namespace figurine::tests::pixel_layout_test

@@ -9,7 +9,7 @@
 
 #include "runtime/test_packages.h"
 
-namespace figurine {
+namespace figurine::tile_bins_test {
 namespace {
 
 using kernels::Splat;
@@ -167,4 +167,4 @@ TEST(TileBins, MorePairsThanTheListHoldsComeInBands) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::tile_bins_test

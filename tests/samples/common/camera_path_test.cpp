@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-namespace figurine::samples {
+namespace figurine::samples::camera_path_test {
 namespace {
 
 constexpr uint32_t kPelvis = 0, kHead = 15;
@@ -83,4 +83,4 @@ TEST_F(CameraPath, ACameraThatIsFixedFramesByItself) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::camera_path_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace figurine::samples {
+namespace figurine::samples::camera_spec_test {
 namespace {
 
 constexpr const char* kSound =
@@ -91,4 +91,4 @@ TEST(ResizeCamera, KeepsThePicture) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::camera_spec_test

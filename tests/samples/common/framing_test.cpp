@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-namespace figurine::samples {
+namespace figurine::samples::framing_test {
 namespace {
 
 std::vector<Point> box_corners(Point low, Point high) {
@@ -141,4 +141,4 @@ TEST(SmoothPath, OneFrameStaysWhereItIs) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::framing_test

@@ -14,7 +14,7 @@
 
 #include "samples/common/y4m_pipe.h"
 
-namespace figurine::samples {
+namespace figurine::samples::live_sink_test {
 namespace {
 
 constexpr uint64_t kMs = 1'000'000;
@@ -230,4 +230,4 @@ TEST(Y4mPipe, RefusesRatesThatY4mCannotSay) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::live_sink_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace figurine::samples {
+namespace figurine::samples::parse_test {
 namespace {
 
 TEST(ParseSize, TakesWidthAndHeight) {
@@ -84,4 +84,4 @@ TEST(NumberedName, IsNoPrintfFormat) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::parse_test

@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-namespace figurine::samples {
+namespace figurine::samples::pose_source_test {
 namespace {
 
 // Three frames of two joints; every number tells where it stands.
@@ -85,4 +85,4 @@ TEST(StillPose, StaysAsItIs) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::pose_source_test

@@ -5,7 +5,7 @@
 
 #include "figurine/renderer.h"
 
-namespace figurine::samples {
+namespace figurine::samples::rendered_frame_test {
 namespace {
 
 constexpr ImageSize kSize{34, 18};
@@ -40,4 +40,4 @@ TEST(RenderedFrame, HoldsEveryFormat) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::rendered_frame_test

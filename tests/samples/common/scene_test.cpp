@@ -9,7 +9,7 @@
 
 #include "samples/program.h"
 
-namespace figurine::samples {
+namespace figurine::samples::scene_test {
 namespace {
 
 class Scenes : public testing::Test {
@@ -126,4 +126,4 @@ TEST_F(Scenes, SwayingIsAboutTheFirstFrame) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::scene_test

@@ -13,7 +13,7 @@
 #include "samples/ply_text.h"
 #include "samples/program.h"
 
-namespace figurine::tests {
+namespace figurine::tests::cli_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -725,4 +725,4 @@ TEST_F(Cli, ExistingFilesAreReplacedOnlyByWholeOnes) {
 }
 
 }  // namespace
-}  // namespace figurine::tests
+}  // namespace figurine::tests::cli_test

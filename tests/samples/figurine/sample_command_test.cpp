@@ -14,7 +14,7 @@
 #include "runtime/sample/random_sampler.h"
 #include "samples/program.h"
 
-namespace figurine {
+namespace figurine::sample_command_test {
 namespace {
 
 using tests::ProgramRun;
@@ -270,4 +270,4 @@ TEST_F(SampleCommand, AFullDiskLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::sample_command_test

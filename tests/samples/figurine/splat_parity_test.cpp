@@ -14,7 +14,7 @@
 #include "samples/ply_text.h"
 #include "samples/program.h"
 
-namespace figurine::tests {
+namespace figurine::tests::splat_parity_test {
 namespace {
 
 // 20,000 Gaussians with SH 3 before the camera: balls, discs and needles of 2 mm to 60 mm,
@@ -87,4 +87,4 @@ TEST(SplatParity, TwentyThousandGaussiansThroughFiles) {
 TEST(SplatParity, TheSameAntialiased) { EXPECT_GE(compare_through_files(true), 75); }
 
 }  // namespace
-}  // namespace figurine::tests
+}  // namespace figurine::tests::splat_parity_test

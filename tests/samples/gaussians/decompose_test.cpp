@@ -10,7 +10,7 @@
 
 #include "largest_error.h"
 
-namespace figurine::samples {
+namespace figurine::samples::decompose_test {
 namespace {
 
 using Matrix = std::array<double, 9>;
@@ -99,4 +99,4 @@ TEST(Decompose, FlatAndPointlikeGaussians) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::decompose_test

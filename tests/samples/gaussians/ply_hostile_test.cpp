@@ -8,7 +8,7 @@
 #include "samples/gaussians/ply.h"
 #include "samples/ply_text.h"
 
-namespace figurine::samples {
+namespace figurine::samples::ply_hostile_test {
 namespace {
 
 using tests::PlyColumn;
@@ -160,4 +160,4 @@ TEST(HostilePly, FlippedBytesStaySound) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::ply_hostile_test

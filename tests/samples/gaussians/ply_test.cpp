@@ -13,7 +13,7 @@
 #include "largest_error.h"
 #include "samples/ply_text.h"
 
-namespace figurine::samples {
+namespace figurine::samples::ply_test {
 namespace {
 
 using tests::make_ply;
@@ -257,4 +257,4 @@ TEST(GaussianPly, WritesCommentsThatReadersSkip) {
 }
 
 }  // namespace
-}  // namespace figurine::samples
+}  // namespace figurine::samples::ply_test

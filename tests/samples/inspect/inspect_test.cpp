@@ -11,7 +11,7 @@
 
 #include "formats/package_samples.h"
 
-namespace figurine {
+namespace figurine::inspect_test {
 namespace {
 
 const std::string kGolden = FIGURINE_SOURCE_DIR "/tests/golden/packages/";
@@ -276,4 +276,4 @@ TEST(Inspect, DiffNamesEveryDifferenceAndNoOther) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::inspect_test

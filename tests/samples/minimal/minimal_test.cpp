@@ -4,7 +4,7 @@
 
 #include "samples/program.h"
 
-namespace figurine::tests {
+namespace figurine::tests::minimal_test {
 namespace {
 
 class Minimal : public testing::TestWithParam<const char*> {
@@ -49,4 +49,4 @@ INSTANTIATE_TEST_SUITE_P(Languages, Minimal, testing::Values(FIGURINE_MINIMAL, F
                          });
 
 }  // namespace
-}  // namespace figurine::tests
+}  // namespace figurine::tests::minimal_test
