@@ -17,7 +17,7 @@
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/tensor_file.h"
 
-namespace figurine::features {
+namespace figurine::features::feature_trainer_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -204,4 +204,4 @@ TEST_F(FeatureTraining, EvaluationRefusesWhoeverWasLearntFrom) {
 }
 
 }  // namespace
-}  // namespace figurine::features
+}  // namespace figurine::features::feature_trainer_test

@@ -11,7 +11,7 @@
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/run_directory.h"
 
-namespace figurine::train {
+namespace figurine::train::run_directory_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -230,4 +230,4 @@ TEST_F(RunDirectoryTest, ParameterCountsAreTheDesigns) {
 }
 
 }  // namespace
-}  // namespace figurine::train
+}  // namespace figurine::train::run_directory_test
