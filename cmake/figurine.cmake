@@ -113,9 +113,10 @@ function(figurine_test_suites variable)
     file(READ "${source}" text)
     string(REGEX MATCHALL "\n *TEST(_F)?\\([A-Za-z0-9_]+" tests "${text}")
     list(TRANSFORM tests REPLACE "^.*\\((.*)$" "\\1.*")
-    string(REGEX MATCHALL "\nINSTANTIATE_TEST_SUITE_P\\([A-Za-z0-9_]+,[ \n]*[A-Za-z0-9_]+"
-      instances "${text}")
-    list(TRANSFORM instances REPLACE "^.*\\(([A-Za-z0-9_]+),[ \n]*([A-Za-z0-9_]+)$" "\\1/\\2.*")
+    string(REGEX MATCHALL
+      "\nINSTANTIATE_TEST_SUITE_P\\([ \n]*[A-Za-z0-9_]+,[ \n]*[A-Za-z0-9_]+" instances "${text}")
+    list(TRANSFORM instances
+      REPLACE "^.*\\([ \n]*([A-Za-z0-9_]+),[ \n]*([A-Za-z0-9_]+)$" "\\1/\\2.*")
     list(APPEND patterns ${tests} ${instances})
     # What is not found by the above would never run.
     if(text MATCHES "TYPED_TEST|\n +(TEST_P|INSTANTIATE_)")

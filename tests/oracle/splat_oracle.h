@@ -220,27 +220,27 @@ inline Image render(const Gaussians& gaussians, const Camera& camera, const Opti
         x1 = pixel(splat.mean_px[0] + middle + rx + 1, x1);
       }
       for (int64_t x = x0; x < x1; ++x) {
-        const size_t pixel = static_cast<size_t>(y) * camera.width_px + static_cast<size_t>(x);
-        if (stopped[pixel]) continue;
+        const size_t at = static_cast<size_t>(y) * camera.width_px + static_cast<size_t>(x);
+        if (stopped[at]) continue;
         const double power =
             power_at(splat, x + 0.5 - splat.mean_px[0], y + 0.5 - splat.mean_px[1]);
         if (power > 0) continue;
         const double alpha = std::min(double(kAlphaMax), splat.opacity * std::exp(power));
         const auto doubt = [&](double value, double threshold) {
-          if (std::abs(value - threshold) < options.doubt * threshold) image.doubtful[pixel] = 1;
+          if (std::abs(value - threshold) < options.doubt * threshold) image.doubtful[at] = 1;
         };
         doubt(alpha, options.alpha_cut);
         if (alpha < options.alpha_cut) continue;
-        const double next = image.transmittance[pixel] * (1 - alpha);
+        const double next = image.transmittance[at] * (1 - alpha);
         doubt(next, kTransmittanceStop);
         if (next < kTransmittanceStop) {
-          stopped[pixel] = 1;
+          stopped[at] = 1;
           continue;
         }
         for (int channel = 0; channel < 3; ++channel) {
-          image.rgb[3 * pixel + channel] += image.transmittance[pixel] * alpha * splat.rgb[channel];
+          image.rgb[3 * at + channel] += image.transmittance[at] * alpha * splat.rgb[channel];
         }
-        image.transmittance[pixel] = next;
+        image.transmittance[at] = next;
       }
     }
   }

@@ -18,7 +18,7 @@
 #include "toolchain/train/trainer.h"
 #include "toolchain/verify/parity.h"
 
-namespace figurine::verify {
+namespace figurine::verify::parity_test {
 namespace {
 
 using testing_tools::small_capture;
@@ -177,4 +177,4 @@ TEST(Pack, IsTheSameBytesTwice) {
 }
 
 }  // namespace
-}  // namespace figurine::verify
+}  // namespace figurine::verify::parity_test

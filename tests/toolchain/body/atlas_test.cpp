@@ -13,7 +13,7 @@
 #include "toolchain/body/test_files.h"
 #include "toolchain/body/texel_body.h"
 
-namespace figurine::body {
+namespace figurine::body::atlas_test {
 namespace {
 
 constexpr AtlasOptions kQuick{.uv_size = 128, .coarsest_grid = 32, .attempts = 200};
@@ -288,4 +288,4 @@ TEST(AtlasPicture, ShowsPartsBordersAndNothing) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::atlas_test

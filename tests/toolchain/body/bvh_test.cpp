@@ -4,7 +4,7 @@
 #include "gtest/gtest.h"
 #include "toolchain/body/test_files.h"
 
-namespace figurine::body {
+namespace figurine::body::bvh_test {
 namespace {
 
 const std::string kSound = R"(HIERARCHY
@@ -97,4 +97,4 @@ TEST(Bvh, DepthAndCountsAreLimited) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::bvh_test

@@ -6,7 +6,7 @@
 
 #include "gtest/gtest.h"
 
-namespace figurine::body {
+namespace figurine::body::chart_packer_test {
 namespace {
 
 void add_rectangle(FlatChart& chart, double x, double y, double width, double height) {
@@ -149,4 +149,4 @@ TEST(ChartPacker, FindsNothingWhereGapsFillTheSquare) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::chart_packer_test

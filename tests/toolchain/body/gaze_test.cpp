@@ -9,7 +9,7 @@
 #include "toolchain/body/skeleton.h"
 #include "toolchain/error.h"
 
-namespace figurine::body {
+namespace figurine::body::gaze_test {
 namespace {
 
 constexpr float kDegree = std::numbers::pi_v<float> / 180;
@@ -85,4 +85,4 @@ TEST(WithHeadPitch, RefusesWhatNoNeckCanDo) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::gaze_test

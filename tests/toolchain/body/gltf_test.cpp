@@ -11,7 +11,7 @@
 #include "toolchain/body/glb_builder.h"
 #include "toolchain/body/test_files.h"
 
-namespace figurine::body {
+namespace figurine::body::gltf_test {
 namespace {
 
 using test::GlbBuilder;
@@ -383,4 +383,4 @@ TEST(Gltf, DepthAndCountsAreLimited) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::gltf_test

@@ -13,7 +13,7 @@
 #include "toolchain/body/texel_body.h"
 #include "toolchain/error.h"
 
-namespace figurine::body {
+namespace figurine::body::makehuman_test {
 namespace {
 
 std::string directory() {
@@ -292,4 +292,4 @@ TEST(MakeHumanLoad, NamesFileAndReason) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::makehuman_test

@@ -10,7 +10,7 @@
 #include "gtest/gtest.h"
 #include "toolchain/body/texel_body.h"
 
-namespace figurine::body {
+namespace figurine::body::mannequin_test {
 namespace {
 
 const BodyModel& model() {
@@ -134,4 +134,4 @@ TEST(Mannequin, IsTheSameEveryTime) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::mannequin_test

@@ -18,7 +18,7 @@
 #include "toolchain/body/test_files.h"
 #include "toolchain/body/texel_body.h"
 
-namespace figurine::body {
+namespace figurine::body::retarget_glb_test {
 namespace {
 
 using test::direction;
@@ -444,4 +444,4 @@ TEST(RetargetGlb, EmotesStandUprightAndFaceForward) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::retarget_glb_test

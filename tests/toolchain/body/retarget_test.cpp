@@ -16,7 +16,7 @@
 #include "toolchain/body/test_files.h"
 #include "toolchain/body/texel_body.h"
 
-namespace figurine::body {
+namespace figurine::body::retarget_test {
 namespace {
 
 using test::direction;
@@ -327,4 +327,4 @@ TEST(MotionClip, TurningTurnsAboutTheVerticalThroughTheRoot) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::retarget_test

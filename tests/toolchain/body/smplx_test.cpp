@@ -9,7 +9,7 @@
 #include "toolchain/body/test_files.h"
 #include "toolchain/body/texel_body.h"
 
-namespace figurine::body {
+namespace figurine::body::smplx_test {
 namespace {
 
 constexpr size_t kVertices = 10475, kFaces = 20908, kUvs = 11313;
@@ -180,4 +180,4 @@ TEST(Npy, EveryPrefixAndSurplusIsRefused) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::smplx_test

@@ -9,7 +9,7 @@
 #include "toolchain/body/test_files.h"
 #include "toolchain/error.h"
 
-namespace figurine::body {
+namespace figurine::body::texel_body_test {
 namespace {
 
 constexpr uint32_t kSize = 16;
@@ -179,4 +179,4 @@ TEST(TexelBody, SurvivesThePackage) {
 }
 
 }  // namespace
-}  // namespace figurine::body
+}  // namespace figurine::body::texel_body_test

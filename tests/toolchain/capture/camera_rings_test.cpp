@@ -8,7 +8,7 @@
 #include "toolchain/capture/sequence.h"
 #include "toolchain/error.h"
 
-namespace figurine::capture {
+namespace figurine::capture::camera_rings_test {
 namespace {
 
 // A box about as large as a person.
@@ -159,4 +159,4 @@ TEST(Sequence, LaysMotionsEndToEnd) {
 }
 
 }  // namespace
-}  // namespace figurine::capture
+}  // namespace figurine::capture::camera_rings_test

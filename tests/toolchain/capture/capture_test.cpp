@@ -17,7 +17,7 @@
 #include "toolchain/error.h"
 #include "toolchain/temporary_folder.h"
 
-namespace figurine::capture {
+namespace figurine::capture::capture_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -378,4 +378,4 @@ TEST(Capture, ContactSheetShowsPeople) {
 }
 
 }  // namespace
-}  // namespace figurine::capture
+}  // namespace figurine::capture::capture_test

@@ -10,7 +10,7 @@
 #include "toolchain/capture/cloth_strength.h"
 #include "toolchain/capture/renderer.h"
 
-namespace figurine::capture {
+namespace figurine::capture::folds_test {
 namespace {
 
 constexpr uint32_t kColumns = 40, kRows = 40;
@@ -275,4 +275,4 @@ TEST(Folds, ShowInPicturesOfThePoseAlone) {
 }
 
 }  // namespace
-}  // namespace figurine::capture
+}  // namespace figurine::capture::folds_test

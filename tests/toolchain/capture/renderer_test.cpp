@@ -6,7 +6,7 @@
 #include "gtest/gtest.h"
 #include "toolchain/capture/shading.h"
 
-namespace figurine::capture {
+namespace figurine::capture::renderer_test {
 namespace {
 
 std::shared_ptr<const Texture> flat_texture(std::array<uint8_t, 4> rgba) {
@@ -197,4 +197,4 @@ TEST(Renderer, ASmoothBallIsLitWithoutAcne) {
 }
 
 }  // namespace
-}  // namespace figurine::capture
+}  // namespace figurine::capture::renderer_test

@@ -4,7 +4,7 @@
 
 #include "gtest/gtest.h"
 
-namespace figurine::capture {
+namespace figurine::capture::texture_test {
 namespace {
 
 TEST(Texture, SrgbEncodingIsTheInverseOfDecoding) {
@@ -82,4 +82,4 @@ TEST(Texture, DyedClothHasTheDyesColourAndItsOwnLightAndDark) {
 }
 
 }  // namespace
-}  // namespace figurine::capture
+}  // namespace figurine::capture::texture_test

@@ -16,7 +16,7 @@
 #include "toolchain/capture/proxy.h"
 #include "toolchain/error.h"
 
-namespace figurine::capture {
+namespace figurine::capture::wardrobe_test {
 namespace {
 
 std::string directory() {
@@ -322,4 +322,4 @@ TEST(Cover, FindsWhatLiesUnderAGarment) {
 }
 
 }  // namespace
-}  // namespace figurine::capture
+}  // namespace figurine::capture::wardrobe_test

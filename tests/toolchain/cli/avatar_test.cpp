@@ -11,7 +11,7 @@
 #include "samples/program.h"
 #include "tests/toolchain/train/small_capture.h"
 
-namespace figurine::cli {
+namespace figurine::cli::avatar_test {
 namespace {
 
 using testing_tools::small_capture;
@@ -84,4 +84,4 @@ TEST(Threads, NetworksRunOnThoseThatGiveWay) {
 }
 
 }  // namespace
-}  // namespace figurine::cli
+}  // namespace figurine::cli::avatar_test

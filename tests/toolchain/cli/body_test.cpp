@@ -9,7 +9,7 @@
 #include "ports/media/png.h"
 #include "samples/program.h"
 
-namespace figurine::cli {
+namespace figurine::cli::body_test {
 namespace {
 
 using tests::ProgramRun;
@@ -124,4 +124,4 @@ TEST(BodyCommand, RefusesLayoutsInOneLineAndLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace figurine::cli
+}  // namespace figurine::cli::body_test

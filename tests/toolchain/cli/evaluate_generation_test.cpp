@@ -9,7 +9,7 @@
 #include "toolchain/features/people.h"
 #include "toolchain/population/small_recipe.h"
 
-namespace figurine::cli {
+namespace figurine::cli::evaluate_generation_test {
 namespace {
 
 using tests::ProgramRun;
@@ -159,4 +159,4 @@ TEST(EvaluateGeneration, BadInputGivesOneLineAndNoReport) {
 }
 
 }  // namespace
-}  // namespace figurine::cli
+}  // namespace figurine::cli::evaluate_generation_test

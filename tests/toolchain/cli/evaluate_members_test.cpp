@@ -10,7 +10,7 @@
 #include "ports/host/files.h"
 #include "samples/program.h"
 
-namespace figurine::cli {
+namespace figurine::cli::evaluate_members_test {
 namespace {
 
 using tests::make_test_avatar;
@@ -146,4 +146,4 @@ TEST(EvaluateMembers, BadInputGivesOneLineAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace figurine::cli
+}  // namespace figurine::cli::evaluate_members_test

@@ -8,7 +8,7 @@
 #include "samples/program.h"
 #include "toolchain/features/people.h"
 
-namespace figurine::cli {
+namespace figurine::cli::features_test {
 namespace {
 
 using tests::ProgramRun;
@@ -91,4 +91,4 @@ TEST(FeaturesCommand, BadInputGivesOneLineAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace figurine::cli
+}  // namespace figurine::cli::features_test

@@ -11,7 +11,7 @@
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/texel_body.h"
 
-namespace figurine::cli {
+namespace figurine::cli::motion_test {
 namespace {
 
 using tests::ProgramRun;
@@ -93,4 +93,4 @@ TEST(MotionCommand, BadFilesGiveOneLineAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace figurine::cli
+}  // namespace figurine::cli::motion_test

@@ -11,7 +11,7 @@
 #include "toolchain/body/texel_body.h"
 #include "toolchain/dataset/mvhumannet_folder.h"
 
-namespace figurine::dataset {
+namespace figurine::dataset::dataset_test {
 namespace {
 
 using test::input_error;
@@ -283,4 +283,4 @@ TEST(DefaultSplit, AlwaysLeavesSomethingToTrainOn) {
 }
 
 }  // namespace
-}  // namespace figurine::dataset
+}  // namespace figurine::dataset::dataset_test

@@ -5,7 +5,7 @@
 
 #include "toolchain/dataset/mvhumannet_folder.h"
 
-namespace figurine::dataset {
+namespace figurine::dataset::jpeg_test {
 namespace {
 
 // Smooth in all channels, with chroma that changes from pixel to pixel.
@@ -88,4 +88,4 @@ TEST(Jpeg, FlippedBytesDecodeOrAreReported) {
 }
 
 }  // namespace
-}  // namespace figurine::dataset
+}  // namespace figurine::dataset::jpeg_test

@@ -16,7 +16,7 @@
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/tensor_file.h"
 
-namespace figurine::features {
+namespace figurine::features::feature_network_test {
 
 using measure::Picture;
 using measure::RowMatrix;
@@ -297,4 +297,4 @@ TEST(Blur, KeepsWhatIsFlatAndTheMean) {
 }
 
 }  // namespace
-}  // namespace figurine::features
+}  // namespace figurine::features::feature_network_test

@@ -17,13 +17,13 @@
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/tensor_file.h"
 
-namespace figurine::features {
+namespace figurine::features::feature_trainer_test {
 namespace {
 
 namespace fs = std::filesystem;
 using test::input_error;
 
-class FeatureTraining : public testing::Test {
+class FeatureTraining : public ::testing::Test {
  protected:
   void SetUp() override {
     test::write_people(path("people.fgn"));
@@ -204,4 +204,4 @@ TEST_F(FeatureTraining, EvaluationRefusesWhoeverWasLearntFrom) {
 }
 
 }  // namespace
-}  // namespace figurine::features
+}  // namespace figurine::features::feature_trainer_test

@@ -15,7 +15,7 @@
 #include "toolchain/body/test_files.h"
 #include "toolchain/tensor_operations.h"
 
-namespace figurine::features {
+namespace figurine::features::user_networks_test {
 
 using measure::RowMatrix;
 
@@ -365,4 +365,4 @@ TEST(Inception, SaysWhatIsWrongWithAFile) {
 }
 
 }  // namespace
-}  // namespace figurine::features
+}  // namespace figurine::features::user_networks_test

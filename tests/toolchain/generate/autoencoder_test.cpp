@@ -11,7 +11,7 @@
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/threads.h"
 
-namespace figurine::generate {
+namespace figurine::generate::autoencoder_test {
 namespace {
 
 using measure::RowMatrix;
@@ -118,4 +118,4 @@ TEST(Autoencoder, LearnsToGiveMembersBack) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::autoencoder_test

@@ -8,7 +8,7 @@
 
 #include "toolchain/error.h"
 
-namespace figurine::generate {
+namespace figurine::generate::model_space_test {
 namespace {
 
 using measure::RowMatrix;
@@ -103,4 +103,4 @@ TEST(ModelSpace, ATokenThatNothingVariesInStays) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::model_space_test

@@ -10,7 +10,7 @@
 #include "tests/largest_error.h"
 #include "tests/toolchain/generate/normal_rows.h"
 
-namespace figurine::generate {
+namespace figurine::generate::oracle_test {
 namespace {
 
 using tests::normal_rows;
@@ -151,4 +151,4 @@ TEST(GaussianOracle, IsSoundAtPureNoiseAndAtNoNoise) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::oracle_test

@@ -26,7 +26,7 @@
 #include "toolchain/verify/golden_seeds.h"
 #include "toolchain/verify/sampling_error.h"
 
-namespace figurine::generate {
+namespace figurine::generate::pack_sampler_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -270,4 +270,4 @@ TEST(PooledPoseStatistics, AreThoseOfAllTrainingMembersTogether) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::pack_sampler_test

@@ -9,7 +9,7 @@
 #include "figurine/detail/noise_level.h"
 #include "tests/toolchain/generate/normal_rows.h"
 
-namespace figurine::verify {
+namespace figurine::verify::posterior_entropy_test {
 namespace {
 
 std::vector<NoiseLevel> levels_at(size_t dimension, std::initializer_list<double> dimension_snr) {
@@ -52,4 +52,4 @@ TEST(PosteriorEntropy, IsTheSameForTheSameSeed) {
 }
 
 }  // namespace
-}  // namespace figurine::verify
+}  // namespace figurine::verify::posterior_entropy_test

@@ -9,7 +9,7 @@
 
 #include "tests/toolchain/generate/ranks.h"
 
-namespace figurine::generate {
+namespace figurine::generate::process_group_test {
 namespace {
 
 using tests::Ranks;
@@ -193,4 +193,4 @@ TEST(ProcessGroup, AloneChangesNothing) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::process_group_test

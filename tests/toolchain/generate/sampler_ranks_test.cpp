@@ -10,7 +10,7 @@
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/tensor_file.h"
 
-namespace figurine::generate {
+namespace figurine::generate::sampler_ranks_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -236,4 +236,4 @@ TEST_F(SamplerRanks, RefuseTogether) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::sampler_ranks_test

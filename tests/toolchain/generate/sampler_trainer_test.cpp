@@ -18,7 +18,7 @@
 #include "toolchain/train/tensor_file.h"
 #include "toolchain/train/threads.h"
 
-namespace figurine::generate {
+namespace figurine::generate::sampler_trainer_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -206,4 +206,4 @@ TEST_F(SamplerTraining, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::sampler_trainer_test

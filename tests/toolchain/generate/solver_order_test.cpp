@@ -10,7 +10,7 @@
 #include "runtime/src/sample/solver.h"
 #include "tests/toolchain/generate/normal_rows.h"
 
-namespace figurine::generate {
+namespace figurine::generate::solver_order_test {
 namespace {
 
 using tests::normal_rows;
@@ -225,4 +225,4 @@ TEST(SolverOrder, FromPureNoiseConverges) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::solver_order_test

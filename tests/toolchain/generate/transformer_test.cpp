@@ -9,7 +9,7 @@
 #include "toolchain/error.h"
 #include "toolchain/tensor_operations.h"
 
-namespace figurine::generate {
+namespace figurine::generate::transformer_test {
 namespace {
 
 const TransformerShape kSmall{
@@ -129,4 +129,4 @@ TEST(Transformer, RefusesShapesThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace figurine::generate
+}  // namespace figurine::generate::transformer_test

@@ -14,7 +14,7 @@
 #include "tests/toolchain/measure/random_rows.h"
 #include "toolchain/error.h"
 
-namespace figurine::generation {
+namespace figurine::generation::baselines_test {
 
 using measure::rms_distances;
 using measure::RowMatrix;
@@ -161,4 +161,4 @@ TEST(GenerationBaselines, RefuseWhatCannotBeDrawn) {
 }
 
 }  // namespace
-}  // namespace figurine::generation
+}  // namespace figurine::generation::baselines_test

@@ -24,7 +24,7 @@
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
 
-namespace figurine::generation {
+namespace figurine::generation::captured_people_test {
 
 using measure::Picture;
 using measure::union_error;
@@ -253,4 +253,4 @@ TEST_F(CapturedPeopleTest, AnotherPopulationsRecipeIsRefused) {
 }
 
 }  // namespace
-}  // namespace figurine::generation
+}  // namespace figurine::generation::captured_people_test

@@ -15,7 +15,7 @@
 #include "runtime/test_packages.h"
 #include "toolchain/error.h"
 
-namespace figurine::generation {
+namespace figurine::generation::networks_test {
 
 using features::ComparingNetworks;
 using features::FeatureNetwork;
@@ -283,4 +283,4 @@ TEST(GenerationNetworks, SayNothingWhereThereAreNone) {
 }
 
 }  // namespace
-}  // namespace figurine::generation
+}  // namespace figurine::generation::networks_test

@@ -14,7 +14,7 @@
 #include "toolchain/generation/baselines.h"
 #include "toolchain/measure/pooled_errors.h"
 
-namespace figurine::generation {
+namespace figurine::generation::novelty_test {
 
 using measure::PictureRows;
 using measure::pooled_mse;
@@ -234,4 +234,4 @@ TEST(Novelty, RefusesWhatSaysNothing) {
 }
 
 }  // namespace
-}  // namespace figurine::generation
+}  // namespace figurine::generation::novelty_test

@@ -11,7 +11,7 @@
 #include "toolchain/error.h"
 #include "toolchain/measure/sample_metrics.h"
 
-namespace figurine::measure {
+namespace figurine::measure::bootstrap_test {
 namespace {
 
 TEST(Bootstrap, OfAMeanIsItsStandardError) {
@@ -141,4 +141,4 @@ TEST(Bootstrap, CentredIntervalsHoldWhatPlainOnesMiss) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::bootstrap_test

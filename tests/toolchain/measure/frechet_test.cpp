@@ -11,7 +11,7 @@
 #include "toolchain/error.h"
 #include "toolchain/measure/kernel_distance.h"
 
-namespace figurine::measure {
+namespace figurine::measure::frechet_test {
 namespace {
 
 using tests::random_rows;
@@ -180,4 +180,4 @@ TEST(FeatureDistances, RefuseSetsThatSayNothing) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::frechet_test

@@ -9,7 +9,7 @@
 #include "tests/toolchain/measure/random_rows.h"
 #include "toolchain/error.h"
 
-namespace figurine::measure {
+namespace figurine::measure::kernel_comparison_test {
 namespace {
 
 using tests::random_rows;
@@ -99,4 +99,4 @@ TEST(KernelComparison, RefusesWhatIsNoSetOfPeople) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::kernel_comparison_test

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace figurine::measure {
+namespace figurine::measure::metrics_test {
 namespace {
 
 Picture filled(uint32_t width, uint32_t height, std::array<uint8_t, 4> rgba) {
@@ -228,4 +228,4 @@ TEST(BoundingBox, IsEmptyWithoutAlpha) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::metrics_test

@@ -9,7 +9,7 @@
 #include "tests/toolchain/measure/random_rows.h"
 #include "toolchain/error.h"
 
-namespace figurine::measure {
+namespace figurine::measure::pooled_errors_test {
 namespace {
 
 // Values in [0,1] as pictures of 8 bits have them.
@@ -80,4 +80,4 @@ TEST(PooledErrors, RefuseWhatCannotBeCompared) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::pooled_errors_test

@@ -12,7 +12,7 @@
 #include "toolchain/error.h"
 #include "toolchain/measure/pooled_errors.h"
 
-namespace figurine::measure {
+namespace figurine::measure::sample_metrics_test {
 namespace {
 
 RowMatrix apart(const RowMatrix& a, const RowMatrix& b) {
@@ -202,4 +202,4 @@ TEST(SampleMetrics, RefuseSetsThatSayNothing) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::sample_metrics_test

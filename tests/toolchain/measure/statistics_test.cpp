@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace figurine::measure {
+namespace figurine::measure::statistics_test {
 namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
@@ -46,4 +46,4 @@ TEST(Statistics, CorrelationsSeeLinesAndOrders) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::statistics_test

@@ -5,7 +5,7 @@
 
 #include "runtime/test_packages.h"
 
-namespace figurine::measure {
+namespace figurine::measure::union_error_test {
 namespace {
 
 Picture random_picture(tests::Random& random) {
@@ -46,4 +46,4 @@ TEST(ComparedPictures, EqualThePlainComparison) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::union_error_test

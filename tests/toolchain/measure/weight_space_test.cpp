@@ -10,7 +10,7 @@
 
 #include "runtime/test_packages.h"
 
-namespace figurine::measure {
+namespace figurine::measure::weight_space_test {
 namespace {
 
 using tests::make_test_avatar;
@@ -165,4 +165,4 @@ TEST(WeightSpace, TokensAreAnAvatarsConvolutionsAndItsShape) {
 }
 
 }  // namespace
-}  // namespace figurine::measure
+}  // namespace figurine::measure::weight_space_test

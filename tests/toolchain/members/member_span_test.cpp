@@ -7,7 +7,7 @@
 
 #include "runtime/test_packages.h"
 
-namespace figurine::members {
+namespace figurine::members::member_span_test {
 namespace {
 
 using tests::make_test_avatar;
@@ -31,4 +31,4 @@ TEST(Mix, EndsAreTheMembers) {
 }
 
 }  // namespace
-}  // namespace figurine::members
+}  // namespace figurine::members::member_span_test

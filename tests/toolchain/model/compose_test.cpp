@@ -14,7 +14,7 @@
 
 #include "figurine/network.h"
 
-namespace figurine::model {
+namespace figurine::model::compose_test {
 namespace {
 
 // Two charts of 24 x 24 texels with a ragged edge, one column apart.
@@ -239,4 +239,4 @@ TEST(HeadComposer, HiddenTexelsPassNothingOnWhateverTheirValuesAre) {
 }
 
 }  // namespace
-}  // namespace figurine::model
+}  // namespace figurine::model::compose_test

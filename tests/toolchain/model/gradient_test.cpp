@@ -7,7 +7,7 @@
 
 #include "tests/toolchain/model/gradient_check.h"
 
-namespace figurine {
+namespace figurine::gradient_test {
 namespace {
 
 // Central differences with these steps are good to about 1e-6 of the largest gradient (rounding of
@@ -198,4 +198,4 @@ TEST(HeadDecoding, EqualsTheSharedArithmetic) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::gradient_test

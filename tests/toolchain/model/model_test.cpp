@@ -17,7 +17,7 @@
 #include "toolchain/model/unet.h"
 #include "toolchain/tensor_operations.h"
 
-namespace figurine::model {
+namespace figurine::model::model_test {
 namespace {
 
 // The network's definition (figurine/network.h), evaluated value by value in double. input:
@@ -616,4 +616,4 @@ TEST(Model, LearnsAPictureOfItself) {
 }
 
 }  // namespace
-}  // namespace figurine::model
+}  // namespace figurine::model::model_test

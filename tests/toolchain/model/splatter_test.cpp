@@ -9,7 +9,7 @@
 
 #include "tests/toolchain/model/scenes.h"
 
-namespace figurine {
+namespace figurine::splatter_test {
 namespace {
 
 using model::GaussianBuffer;
@@ -291,4 +291,4 @@ TEST(Splatter, EmptySceneIsTransparent) {
 }
 
 }  // namespace
-}  // namespace figurine
+}  // namespace figurine::splatter_test

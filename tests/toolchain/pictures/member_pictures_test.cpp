@@ -10,7 +10,7 @@
 #include "runtime/test_packages.h"
 #include "toolchain/train/interrupt.h"
 
-namespace figurine::pictures {
+namespace figurine::pictures::member_pictures_test {
 
 using measure::Picture;
 
@@ -55,4 +55,4 @@ TEST(Crew, DoesEveryPieceAndPassesOnWhatIsThrown) {
 }
 
 }  // namespace
-}  // namespace figurine::pictures
+}  // namespace figurine::pictures::member_pictures_test

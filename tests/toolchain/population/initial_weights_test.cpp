@@ -4,7 +4,7 @@
 #include "toolchain/error.h"
 #include "toolchain/population/initial_weights.h"
 
-namespace figurine::population {
+namespace figurine::population::initial_weights_test {
 namespace {
 
 train::TensorFile weights(std::vector<float> values, std::vector<int64_t> shape = {2}) {
@@ -45,4 +45,4 @@ TEST(ReptileStep, FallsLinearlyAfterAWholeFirstStep) {
 }
 
 }  // namespace
-}  // namespace figurine::population
+}  // namespace figurine::population::initial_weights_test

@@ -10,7 +10,7 @@
 #include "toolchain/population/recipe.h"
 #include "toolchain/train/run_directory.h"
 
-namespace figurine::population {
+namespace figurine::population::recipe_test {
 namespace {
 
 using testing_tools::small_recipe;
@@ -103,4 +103,4 @@ TEST(Recipe, RefusesWhatItCannotMeanInOneLine) {
 }
 
 }  // namespace
-}  // namespace figurine::population
+}  // namespace figurine::population::recipe_test

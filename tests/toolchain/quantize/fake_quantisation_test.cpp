@@ -8,7 +8,7 @@
 #include "tests/largest_error.h"
 #include "tests/toolchain/quantize/random_network.h"
 
-namespace figurine::model {
+namespace figurine::model::fake_quantisation_test {
 namespace {
 
 using testing_tools::random_input;
@@ -169,4 +169,4 @@ TEST(FakeQuantisation, DynamicRangesFollowTheInput) {
 }
 
 }  // namespace
-}  // namespace figurine::model
+}  // namespace figurine::model::fake_quantisation_test

@@ -15,7 +15,7 @@
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/trainer.h"
 
-namespace figurine::quantize {
+namespace figurine::quantize::fine_tune_test {
 namespace {
 
 using testing_tools::small_capture;
@@ -136,4 +136,4 @@ TEST(EvaluateQuantization, ReportsEveryRowAndTheIntegersAgree) {
 }
 
 }  // namespace
-}  // namespace figurine::quantize
+}  // namespace figurine::quantize::fine_tune_test

@@ -11,7 +11,7 @@
 #include "toolchain/quantize/range.h"
 #include "toolchain/tensor_operations.h"
 
-namespace figurine::quantize {
+namespace figurine::quantize::quantised_network_test {
 namespace {
 
 // The pose UNet's values: 1, 2 convolutions, 3 pool | 4, 5, 6 | 7, 8, 9 | 10, 11 | up 12, concat 13
@@ -104,4 +104,4 @@ TEST(QuantisedNetwork, OfARandomUNetIsSoundWithBothWeightRanges) {
 }
 
 }  // namespace
-}  // namespace figurine::quantize
+}  // namespace figurine::quantize::quantised_network_test

@@ -7,7 +7,7 @@
 
 #include "figurine/detail/fixed_point_weights.h"
 
-namespace figurine::quantize {
+namespace figurine::quantize::range_test {
 namespace {
 
 std::vector<float> ramp(size_t count, float high) {
@@ -115,4 +115,4 @@ TEST(WeightScale, SmallestErrorIsNeverWorseThanMaxAbs) {
 }
 
 }  // namespace
-}  // namespace figurine::quantize
+}  // namespace figurine::quantize::range_test

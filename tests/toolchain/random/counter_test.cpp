@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace figurine::random {
+namespace figurine::random::counter_test {
 namespace {
 
 TEST(RandomUnit, IsUniformWithinSamplingError) {
@@ -39,4 +39,4 @@ TEST(RandomNormal, HasTheMomentsOfANormal) {
 }
 
 }  // namespace
-}  // namespace figurine::random
+}  // namespace figurine::random::counter_test

@@ -10,7 +10,7 @@
 #include "toolchain/random/split_mix.h"
 #include "toolchain/random/stream.h"
 
-namespace figurine::random {
+namespace figurine::random::first_numbers_test {
 namespace {
 
 TEST(FirstNumbers, OfInitialWeights) {
@@ -67,4 +67,4 @@ TEST(FirstNumbers, OfStatistics) {
 }
 
 }  // namespace
-}  // namespace figurine::random
+}  // namespace figurine::random::first_numbers_test

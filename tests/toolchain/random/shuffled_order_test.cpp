@@ -6,7 +6,7 @@
 #include <set>
 #include <vector>
 
-namespace figurine::random {
+namespace figurine::random::shuffled_order_test {
 namespace {
 
 TEST(ShuffledOrder, VisitsEveryItemOncePerEpochInAFreshOrder) {
@@ -34,4 +34,4 @@ TEST(ShuffledOrder, DiffersBySeed) {
 }
 
 }  // namespace
-}  // namespace figurine::random
+}  // namespace figurine::random::shuffled_order_test

@@ -9,7 +9,7 @@
 
 #include "figurine/detail/philox.h"
 
-namespace figurine::random {
+namespace figurine::random::stream_test {
 namespace {
 
 TEST(RandomStream, IntegersAreTheirWordsShareOfTheCount) {
@@ -78,4 +78,4 @@ TEST(RandomStream, UsesItemsAndSeedsDiffer) {
 }
 
 }  // namespace
-}  // namespace figurine::random
+}  // namespace figurine::random::stream_test

@@ -14,7 +14,7 @@
 #include "toolchain/train/pack_population.h"
 #include "toolchain/train/tensor_file.h"
 
-namespace figurine::train {
+namespace figurine::train::pack_population_test {
 namespace {
 
 using testing_tools::TemporaryFolder;
@@ -169,4 +169,4 @@ TEST(AvatarFile, OpensPackagesAndMembers) {
 }
 
 }  // namespace
-}  // namespace figurine::train
+}  // namespace figurine::train::pack_population_test

@@ -11,17 +11,17 @@
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/run_directory.h"
 
-namespace figurine::train {
+namespace figurine::train::run_directory_test {
 namespace {
 
 namespace fs = std::filesystem;
 
-class RunDirectoryTest : public testing::Test {
+class RunDirectoryTest : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::temp_directory_path() /
               ("figurine_run_" +
-               std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
@@ -250,4 +250,4 @@ TEST_F(RunDirectoryTest, ParameterCountsAreTheDesigns) {
 }
 
 }  // namespace
-}  // namespace figurine::train
+}  // namespace figurine::train::run_directory_test

@@ -9,7 +9,7 @@
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/schedule.h"
 
-namespace figurine::train {
+namespace figurine::train::schedule_test {
 namespace {
 
 TEST(Schedule, RampsThenFollowsTheCosineToItsFloor) {
@@ -60,4 +60,4 @@ TEST(PoseFeatures, HaveTheirMeanAndARegularisedCovariance) {
 }
 
 }  // namespace
-}  // namespace figurine::train
+}  // namespace figurine::train::schedule_test

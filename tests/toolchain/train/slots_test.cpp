@@ -17,7 +17,7 @@
 #include "toolchain/train/slots.h"
 #include "toolchain/train/trainer.h"
 
-namespace figurine::train {
+namespace figurine::train::slots_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -162,4 +162,4 @@ TEST(Slots, ATrainingKilledAnywhereResumesToTheSameBits) {
 }
 
 }  // namespace
-}  // namespace figurine::train
+}  // namespace figurine::train::slots_test

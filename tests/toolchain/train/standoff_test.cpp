@@ -10,7 +10,7 @@
 #include "tests/toolchain/train/small_capture.h"
 #include "toolchain/train/avatar_model.h"
 
-namespace figurine::train {
+namespace figurine::train::standoff_test {
 namespace {
 
 constexpr uint32_t kSize = 64;
@@ -177,4 +177,4 @@ TEST(Standoff, FadesBeforeTheSecondHalf) {
 }
 
 }  // namespace
-}  // namespace figurine::train
+}  // namespace figurine::train::standoff_test

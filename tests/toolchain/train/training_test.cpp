@@ -23,7 +23,7 @@
 #include "toolchain/train/trained_avatar.h"
 #include "toolchain/train/trainer.h"
 
-namespace figurine::train {
+namespace figurine::train::training_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -747,4 +747,4 @@ TEST(Training, OfALossThatIsNotFiniteStopsAndNamesTheIteration) {
 }
 
 }  // namespace
-}  // namespace figurine::train
+}  // namespace figurine::train::training_test
