@@ -6,7 +6,8 @@
 // u.v, c = v.v + e, determinant by Cauchy-Binet. The blend's parameters are
 //   power = -(P (dx - K dy)^2 + Q dy^2),   P = c / (2 det), K = b / c, Q = 1 / (2 c).
 // Where splats are antialiased, opacities are multiplied by rho = sqrt(n.n / det), n = u x v.
-// Based on: Zwicker et al., EWA Splatting, 2002, eq. 22-31; Yu et al., Mip-Splatting, 2024 (the 2D filter).
+// Based on: Zwicker et al., EWA Splatting, 2002, eq. 22-31; Yu et al., Mip-Splatting, 2024 (the 2D
+// filter).
 #pragma once
 
 #include <cmath>
