@@ -31,13 +31,15 @@ struct PackedRun {
   std::string run = folder.path("run"), path = folder.path("avatar.fgn");
 
   explicit PackedRun(TemplateMode mode,
-                     const testing_tools::SmallCapture& capture = small_capture()) {
+                     const testing_tools::SmallCapture& capture = small_capture(),
+                     bool filters = false) {
     train::TrainRequest request{.data = capture.data,
                                 .body = capture.body,
                                 .run = run,
                                 .settings = train::preset_settings("nano"),
                                 .quiet = true};
     request.settings.template_mode = mode;
+    request.settings.smallest_extent = request.settings.antialiased = filters;
     request.settings.schedule.budget = {.iterations = 200, .seconds = 0};
     request.settings.threads = 1;
     train::train_avatar(request);
@@ -68,6 +70,21 @@ void expect_parity(const PackedRun& packed) {
 
 TEST(Parity, OfShapedTemplateIsAtLeast60dB) { expect_parity(packed_run(TemplateMode::kShaped)); }
 TEST(Parity, OfMeanTemplateIsAtLeast60dB) { expect_parity(packed_run(TemplateMode::kMean)); }
+
+// Smallest extents and the antialiased filter, on the device as in training.
+TEST(Parity, WithFiltersIsAtLeast60dB) {
+  const PackedRun packed(TemplateMode::kShaped, small_capture(), true);
+  expect_parity(packed);
+  const train::PackageFile package = train::open_package(packed.path, PackageKind::kAvatar);
+  EXPECT_EQ(package.package.required_features(), kFeatureFilters);
+  // Without either the picture is another one.
+  Avatar without = package.package.avatar();
+  train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
+  without.antialiased = false;
+  EXPECT_LT(compare_with_runtime(avatar, without, {.views = 2}).psnr_db, 50);
+  without.antialiased = true, without.smallest_extents = {};
+  EXPECT_LT(compare_with_runtime(avatar, without, {.views = 2}).psnr_db, 50);
+}
 
 // A layout that is not the mesh's own: captured, trained, packed and drawn like any other.
 TEST(Parity, OfAWeightedLayoutIsAtLeast60dB) {

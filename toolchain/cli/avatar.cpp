@@ -29,7 +29,7 @@ struct AvatarArguments {
   std::string data, body, run;
   bool all = false, resume = false, quiet = false;
   std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser,
-      standoff, network, static_grids, static_colour;
+      standoff, network, static_grids, static_colour, smallest_extent, antialiased;
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay, static_learning_rate, static_penalty,
       clip_gradient;
@@ -71,6 +71,8 @@ void overlay_parts(const AvatarArguments& arguments, train::TrainSettings& setti
     settings.static_learning_rate = *arguments.static_learning_rate;
   if (arguments.static_penalty) settings.static_penalty = *arguments.static_penalty;
   if (arguments.clip_gradient) settings.clip_gradient = *arguments.clip_gradient;
+  if (arguments.smallest_extent) settings.smallest_extent = *arguments.smallest_extent == "on";
+  if (arguments.antialiased) settings.antialiased = *arguments.antialiased == "on";
 }
 
 void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
@@ -242,6 +244,19 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
 }
 
+void add_filter_options(CLI::App* command, AvatarArguments& arguments) {
+  command
+      ->add_option("--smallest-extent", arguments.smallest_extent,
+                   "on: no Gaussian below what the sharpest training view of its texel resolved, "
+                   "for close-ups (default off)")
+      ->check(CLI::IsMember({"on", "off"}));
+  command
+      ->add_option("--antialiased", arguments.antialiased,
+                   "on: what widens a small Gaussian to the pixel grid is taken from its opacity, "
+                   "in training and on devices, for views from afar (default off)")
+      ->check(CLI::IsMember({"on", "off"}));
+}
+
 void add_avatar_command(CLI::App& app) {
   auto arguments = std::make_shared<AvatarArguments>();
   CLI::App* command = app.add_subcommand("avatar", "Train one person's avatar from a capture");
@@ -329,6 +344,7 @@ void add_avatar_command(CLI::App& app) {
           "With --all: trainings at a time, each in its own process (default: cores / threads)")
       ->check(CLI::Range(1, 256));
   add_part_options(command, *arguments);
+  add_filter_options(command, *arguments);
   command->callback([arguments] {
     if (arguments->all) {
       if (arguments->data.empty()) throw InputError("--all needs --data");

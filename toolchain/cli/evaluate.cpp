@@ -1,6 +1,7 @@
 // figurine-train evaluate: how good a trained avatar is (reconstruction), what fixed point
 // (quantization) and a population's rounding (population) cost it, and whether the device draws the
-// same (parity). What a population is like (members) is in evaluate_members.cpp.
+// same (parity). What a population is like (members) is in evaluate_members.cpp, what an avatar is
+// like from elsewhere (distance) in evaluate_distance.cpp.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -297,6 +298,7 @@ void add_evaluate_command(CLI::App& app) {
   population->add_option("-o,--output", arguments->output, "Report to write, JSON");
   population->callback([arguments] { run_population(*arguments); });
 
+  add_evaluate_distance_command(*command);
   add_evaluate_members_command(*command);
   add_evaluate_generation_command(*command);
   add_evaluate_sampling_command(*command);

@@ -33,7 +33,9 @@ struct Decoded {
   Scalar quaternion[4];   // unit
   Scalar inverse_length;  // of the unnormalised quaternion; 0 if it was not usable
   Scalar rotated[9];      // A R
-  Scalar scale[3];
+  Scalar scale[3];        // widened to the smallest extent s: sqrt(own^2 + s^2)
+  Scalar share[3];        // own / scale
+  Scalar kept;            // of the opacity: the product of the shares
   bool scale_clamped[3];
 };
 
@@ -99,7 +101,24 @@ void decode_texel(const HeadFrame& frame, uint32_t texel, const Scalar* h, Decod
       out.rotated[3 * i + j] =
           row[0] * rotation[j] + row[1] * rotation[3 + j] + row[2] * rotation[6 + j];
     }
+    out.share[j] = 1;
   }
+  out.kept = 1;
+  if (frame.smallest_extent_m.empty() || frame.smallest_extent_m[texel] == 0) return;
+  const Scalar s = Scalar(frame.smallest_extent_m[texel]);
+  for (int j = 0; j < 3; ++j) {
+    const Scalar own = out.scale[j];
+    out.scale[j] = std::sqrt(own * own + s * s);
+    out.share[j] = own / out.scale[j];
+  }
+  out.kept = out.share[0] * out.share[1] * out.share[2];
+}
+
+// opacity share_0 share_1 share_2 in the device's order.
+template <class Scalar>
+Scalar widened_opacity(Scalar opacity, const Decoded<Scalar>& decoded) {
+  for (const Scalar share : decoded.share) opacity *= share;
+  return opacity;
 }
 
 // The offset output within its bound, if it has one.
@@ -120,6 +139,9 @@ void check(const HeadFrame& frame) {
       "one canonical position per texel");
   FIG_CHECK(frame.world_from_rest.size() == frame.body->joint_count(),
             "one skinning transform per joint");
+  FIG_CHECK(frame.smallest_extent_m.empty() ||
+                frame.smallest_extent_m.size() == frame.body->texel_count(),
+            "one smallest extent per texel");
   FIG_CHECK(frame.decoding.sh_degree <= kMaxShDegree, "SH degree");
 }
 
@@ -159,7 +181,8 @@ void decode_head(const HeadFrame& frame, const Scalar* head, uint32_t threads,
           gaussians.covariance_factor[9 * size_t(i) + 3 * r + j] =
               decoded.rotated[3 * r + j] * decoded.scale[j];
       }
-      gaussians.opacity[i] = sigmoid(h[10] + Scalar(frame.decoding.opacity_bias));
+      gaussians.opacity[i] =
+          widened_opacity(sigmoid(h[10] + Scalar(frame.decoding.opacity_bias)), decoded);
       std::copy_n(h + 11, sh_values, &gaussians.sh[size_t(i) * sh_values]);
     }
   });
@@ -199,12 +222,18 @@ void decode_head_backward(const HeadFrame& frame, const Scalar* head,
                             (m[k] * dp[0] + m[4 + k] * dp[1] + m[8 + k] * dp[2])
                       : Scalar(0);
       }
-      // F = (A R) S: dS_j = sum_i dF_ij (AR)_ij; dR = A^T dF S
+      const Scalar opacity = sigmoid(h[10] + Scalar(frame.decoding.opacity_bias));
+      const Scalar d_opacity = gradients.opacity[i] * at.kept;
+      // F = (A R) S: dS_j = sum_i dF_ij (AR)_ij; dR = A^T dF S. Of the own scale's logarithm,
+      // d ln S_j = share_j^2 and d ln kept = 1 - share_j^2.
       Scalar d_rotation[9];
       for (int j = 0; j < 3; ++j) {
         const Scalar d_scale =
             df[j] * at.rotated[j] + df[3 + j] * at.rotated[3 + j] + df[6 + j] * at.rotated[6 + j];
-        dh[3 + j] = at.scale_clamped[j] ? Scalar(0) : d_scale * at.scale[j];
+        const Scalar squared = at.share[j] * at.share[j];
+        dh[3 + j] = at.scale_clamped[j]
+                        ? Scalar(0)
+                        : d_scale * at.scale[j] * squared + d_opacity * opacity * (1 - squared);
         for (int k = 0; k < 3; ++k)
           d_rotation[3 * k + j] =
               at.scale[j] * (m[k] * df[j] + m[4 + k] * df[3 + j] + m[8 + k] * df[6 + j]);
@@ -216,8 +245,7 @@ void decode_head_backward(const HeadFrame& frame, const Scalar* head,
       for (int k = 0; k < 4; ++k) along += d_unit[k] * at.quaternion[k];
       for (int k = 0; k < 4; ++k)
         dh[6 + k] = at.inverse_length * (d_unit[k] - along * at.quaternion[k]);
-      const Scalar opacity = sigmoid(h[10] + Scalar(frame.decoding.opacity_bias));
-      dh[10] = gradients.opacity[i] * opacity * (1 - opacity);
+      dh[10] = d_opacity * opacity * (1 - opacity);
       std::copy_n(dsh, sh_values, dh + 11);
     }
   });

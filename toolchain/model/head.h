@@ -23,6 +23,8 @@ struct HeadFrame {
       texel_position_m;  // [N,3] canonical: the person's own (shape_body) or body->texel_position_m
   std::span<const Affine> world_from_rest;  // [J] skinning transforms of the same template's joints
   HeadDecoding decoding;
+  // [N] metres, SmallestExtents of the texels; empty: none
+  std::span<const float> smallest_extent_m = {};
 };
 
 // Owned arrays of N Gaussians, reused from frame to frame.

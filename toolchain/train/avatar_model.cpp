@@ -1,5 +1,6 @@
 #include "toolchain/train/avatar_model.h"
 
+#include <algorithm>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
@@ -33,7 +34,9 @@ AvatarModel::AvatarModel(const Body& body, std::vector<float> shape, const Train
       composer_(body, head_layout(settings)),
       grid_body_(body, settings.network ? network_side(settings) : body.uv_size),
       statics_(composer_),
-      renderer_({.threads = settings.threads}) {
+      extents_(settings.smallest_extent ? std::make_shared<SmallestExtentMap>(body.texel_count())
+                                        : nullptr),
+      renderer_({.threads = settings.threads, .antialiased = settings.antialiased}) {
   if (shape.size() > body.shape_count()) {
     throw InputError("body " + body.name + ": has " + std::to_string(body.shape_count()) +
                      " shape coefficients, the person " + std::to_string(shape.size()));
@@ -63,6 +66,7 @@ model::PoseUNet* AvatarModel::checked_unet() const {
 void AvatarModel::share_parts(const AvatarModel& other) {
   if (has_network()) unet_->share_weights(*other.unet_);
   statics_ = other.statics_;
+  extents_ = other.extents_;
 }
 
 OwnedPose AvatarModel::from_capture(const dataset::CaptureFrame& frame) const {
@@ -104,7 +108,9 @@ model::HeadFrame AvatarModel::head_frame(const PosedBody& posed) const {
   return {.body = &body_,
           .texel_position_m = texel_position_m_,
           .world_from_rest = posed.world_from_rest,
-          .decoding = settings_.decoding};
+          .decoding = settings_.decoding,
+          .smallest_extent_m =
+              extents_ == nullptr ? std::span<const float>{} : std::span(extents_->extent_m())};
 }
 
 torch::Tensor AvatarModel::evaluate(const PosedBody& posed) {
@@ -174,7 +180,12 @@ nlohmann::json describe_parts(const AvatarModel& model) {
                {"values", values},
                {"bytes", values + 4 * channels}};
   }
-  return {{"network", network}, {"static", statics}};
+  nlohmann::json extents = nullptr;
+  if (const SmallestExtentMap* map = model.smallest_extents(); map != nullptr && !map->empty()) {
+    const auto [least, most] = std::minmax_element(map->extent_m().begin(), map->extent_m().end());
+    extents = {{"bytes", map->texels()}, {"min_m", *least}, {"max_m", *most}};
+  }
+  return {{"network", network}, {"static", statics}, {"smallest_extent", extents}};
 }
 
 }  // namespace figurine::train

@@ -21,6 +21,7 @@
 #include "toolchain/train/owned_pose.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/settings.h"
+#include "toolchain/train/smallest_extent.h"
 #include "toolchain/train/static_map.h"
 
 namespace figurine::train {
@@ -55,9 +56,14 @@ class AvatarModel {
   const model::PoseUNet& unet() const { return *checked_unet(); }
   StaticMap& statics() { return statics_; }
   const StaticMap& statics() const { return statics_; }
-  // Both, for files.
-  LearnedParts parts() { return {.unet = unet_.get(), .statics = &statics_}; }
-  // From now on both are the other's, in the same memory.
+  // Filled by whoever trains or opens a run; null where the settings want none.
+  SmallestExtentMap* smallest_extents() { return extents_.get(); }
+  const SmallestExtentMap* smallest_extents() const { return extents_.get(); }
+  // All of them, for files.
+  LearnedParts parts() {
+    return {.unet = unet_.get(), .statics = &statics_, .extents = extents_.get()};
+  }
+  // From now on all are the other's, in the same memory.
   void share_parts(const AvatarModel& other);
   model::AvatarRenderer& renderer() { return renderer_; }
 
@@ -102,6 +108,7 @@ class AvatarModel {
   std::vector<float> constant_input_;      // [T_n,T_n,Cin] zeros and Fourier channels
   std::unique_ptr<model::PoseUNet> unet_;  // null without a network
   StaticMap statics_;
+  std::shared_ptr<SmallestExtentMap> extents_;
   model::AvatarRenderer renderer_;
 };
 

@@ -265,6 +265,9 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   content.shape = avatar.model().shape();
   content.fixed_point = options.fixed_point;
   content.static_part = statics.view();
+  if (const SmallestExtentMap* extents = avatar.model().smallest_extents())
+    content.smallest_extents = extents->view();
+  content.antialiased = settings.antialiased;
   content.pose_statistics = {features.joints, features.mean, features.covariance};
   const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
                                 .macs_per_frame = macs,

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
@@ -17,6 +18,7 @@
 #include "toolchain/model/unet.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/flat_tensor.h"
+#include "toolchain/train/smallest_extent.h"
 #include "toolchain/train/static_map.h"
 
 namespace figurine::train {
@@ -118,14 +120,42 @@ void take_statics(const std::string& path, const TensorFile& file, StaticMap& st
   }
 }
 
+constexpr char kExtentScale[] = "smallest_extent.scale_m", kExtentCode[] = "smallest_extent.code";
+
+void add_extents(const SmallestExtentMap& extents, TensorFile& file) {
+  const SmallestExtents view = extents.view();
+  file.tensors[kExtentScale] = {{1}, {view.scale_m}};
+  file.tensors[kExtentCode] = {{static_cast<int64_t>(view.codes.size())},
+                               {view.codes.begin(), view.codes.end()}};
+}
+
+void take_extents(const std::string& path, const TensorFile& file, SmallestExtentMap& extents) {
+  const auto find = [&](const char* name) -> const std::vector<float>& {
+    const auto found = file.tensors.find(name);
+    if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
+    return found->second.values;
+  };
+  const std::vector<float>&scale = find(kExtentScale), &values = find(kExtentCode);
+  if (scale.size() != 1) throw InputError(path + ": " + kExtentScale + ": is not one number");
+  std::vector<uint8_t> codes;
+  for (const float value : values) {
+    if (!(value >= 0 && value <= kLargestExtentCode) || value != std::floor(value))
+      throw InputError(path + ": " + kExtentCode + ": a value is no whole number of 0 to 255");
+    codes.push_back(static_cast<uint8_t>(value));
+  }
+  extents.set(scale[0], std::move(codes), path);
+}
+
 void add_parts(const LearnedParts& parts, TensorFile& file) {
   if (parts.unet != nullptr) add_weights(*parts.unet, file);
   if (parts.statics != nullptr) add_statics(*parts.statics, file);
+  if (parts.extents != nullptr) add_extents(*parts.extents, file);
 }
 
 void take_parts(const std::string& path, const TensorFile& file, const LearnedParts& parts) {
   if (parts.unet != nullptr) take_weights(path, file, *parts.unet);
   if (parts.statics != nullptr) take_statics(path, file, *parts.statics);
+  if (parts.extents != nullptr) take_extents(path, file, *parts.extents);
 }
 
 // [P]'s state under "prefix.". Its number of steps by a key of its own.
@@ -181,6 +211,7 @@ void load_initial_weights(const std::string& path, const LearnedParts& parts) {
   const TensorFile tensors = read_tensor_file(file);
   LearnedParts there = parts;
   if (!tensors.tensors.contains(static_name(0))) there.statics = nullptr;
+  there.extents = nullptr;
   take_parts(file, tensors, there);
 }
 

@@ -5,7 +5,8 @@
 //   log.csv                  iteration, seconds, learning rate, loss, PSNR: means of the iterations
 //                            since the row before
 //   weights.safetensors      the UNet: layer.N.weight [out,k,k,in] (OHWI), layer.N.bias [out]; and
-//                            static.G [M,channels], a static part's values group by group
+//                            static.G [M,channels], a static part's values group by group; and
+//                            smallest_extent.scale_m [1], .code [N], if the run has such
 //   checkpoint.safetensors   the same and what --resume needs: the optimisers' moments, iteration,
 //                            seconds
 //   evaluation.json          by figurine-train evaluate reconstruction
@@ -27,7 +28,8 @@ class Optimiser;
 
 namespace figurine::train {
 
-struct StaticMap;  // static_map.h
+struct StaticMap;         // static_map.h
+class SmallestExtentMap;  // smallest_extent.h
 
 struct RunDirectory {
   std::string path;
@@ -66,10 +68,12 @@ struct LogRow {
   double seconds = 0, learning_rate = 0, loss = 0, psnr_db = 0;
 };
 
-// What training changes. Borrowed; null (statics: also empty) where an avatar has no such part.
+// What training changes, and what it found before it began. Borrowed; null (statics: also empty)
+// where an avatar has no such part.
 struct LearnedParts {
   model::PoseUNet* unet = nullptr;
   StaticMap* statics = nullptr;
+  SmallestExtentMap* extents = nullptr;
 };
 // And what changes it.
 struct PartOptimisers {
@@ -83,7 +87,8 @@ void save_weights(const RunDirectory& run, const LearnedParts& parts);
 void load_weights(const std::string& path, const LearnedParts& parts);
 // The network alone.
 void load_weights(const std::string& path, model::PoseUNet& unet);
-// As load_weights, but static values that the file has none of stay as they are.
+// As load_weights, but static values that the file has none of stay as they are, and so do extents:
+// they are of the person, not of the weights.
 void load_initial_weights(const std::string& path, const LearnedParts& parts);
 
 void save_checkpoint(const RunDirectory& run, const TrainingState& state, const LearnedParts& parts,

@@ -224,6 +224,8 @@ void add_parts(const TrainSettings& s, nlohmann::json& json) {
   if (s.network_size > 0) json["network_size"] = s.network_size;
   if (s.channels > 0) json["channels"] = s.channels;
   if (s.clip_gradient > 0) json["clip_gradient"] = s.clip_gradient;
+  if (s.smallest_extent) json["smallest_extent"] = true;
+  if (s.antialiased) json["antialiased"] = true;
   if (s.static_grids.empty()) return;
   json["static_grids"] = to_string(s.static_grids);
   json["static_colour"] = to_string(s.static_colour);
@@ -237,6 +239,8 @@ void read_parts(const nlohmann::json& json, const std::string& where, TrainSetti
   require(network == "unet" || network == "none", where, "network: is neither unet nor none");
   s.network = network != "none";
   s.network_size = json.value("network_size", 0u);
+  s.smallest_extent = json.value("smallest_extent", false);
+  s.antialiased = json.value("antialiased", false);
   s.channels = json.value("channels", 0u);
   s.clip_gradient = json.value("clip_gradient", 0.0);
   s.static_grids = parse_static_grids(json.value("static_grids", std::string("none")), where);

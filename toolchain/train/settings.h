@@ -72,9 +72,12 @@ struct TrainSettings {
   model::StaticColour static_colour = model::StaticColour::kGain;  // packages hold gains alone
   double static_learning_rate = 1.5e-2;  // peak of AdamW for the static values, on the network's
                                          // schedule; 0: they stay
-  double static_penalty = 0;  // weight of the static values' mean square in the loss: what the
-                              // network can say as well it says
-  double clip_gradient = 0;   // largest norm of all gradients together; 0: none
+  double static_penalty = 0;     // weight of the static values' mean square in the loss: what the
+                                 // network can say as well it says
+  double clip_gradient = 0;      // largest norm of all gradients together; 0: none
+  bool smallest_extent = false;  // no Gaussian below what the sharpest view resolved
+                                 // (smallest_extent.h)
+  bool antialiased = false;      // SplatOptions::antialiased, in training and ever after
   OptimiserKind optimiser = OptimiserKind::kMuon;
   // AdamW's. An epsilon of 1e-8 would swallow the small gradients of a mean loss.
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-10, weight_decay = 0;

@@ -189,6 +189,8 @@ class Trainer {
     } else {
       if (!settings_.init.empty()) load_initial_weights(settings_.init, model_.parts());
       if (request_.fake_quantisation != nullptr) round_statics();
+      if (SmallestExtentMap* extents = model_.smallest_extents())
+        round_extents(measure_extents(data_, model_), data_.directory(), *extents);
       description_["parts"] = describe_parts(model_);
       write_json(run_.run_json(), description_);
     }

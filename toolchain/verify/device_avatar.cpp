@@ -7,8 +7,8 @@ namespace figurine::verify {
 
 DeviceAvatar::DeviceAvatar(const Avatar& avatar, const Package& body)
     : renderer_(value_or_throw(Renderer::create({.threads = 1}), "runtime")),
-      avatar_(value_or_throw(renderer_->add_avatar(avatar, body, Precision::kFloat32), "runtime")) {
-}
+      avatar_(value_or_throw(renderer_->add_avatar(avatar, body, Precision::kFloat32), "runtime")),
+      antialiased_(avatar.antialiased) {}
 
 DeviceAvatar::~DeviceAvatar() = default;
 
@@ -34,8 +34,11 @@ measure::Picture DeviceAvatar::draw(const Camera& camera, const std::array<float
                                      .opacity = opacity_,
                                      .sh = sh_}};
   std::vector<float> rgba(size_t(camera.width_px) * camera.height_px * 4);
-  const Frame frame{
-      .camera = moved, .avatars = {}, .gaussians = gaussians, .background = {}, .splat = {}};
+  const Frame frame{.camera = moved,
+                    .avatars = {},
+                    .gaussians = gaussians,
+                    .background = {},
+                    .splat = {.antialiased = antialiased_}};
   throw_if_error(renderer_->render(frame, {.pixels = rgba.data(),
                                            .stride_bytes = 4 * sizeof(float) * camera.width_px,
                                            .format = PixelFormat::kRgbaF32}),

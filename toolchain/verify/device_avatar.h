@@ -42,6 +42,7 @@ class DeviceAvatar {
  private:
   std::unique_ptr<Renderer> renderer_;
   AvatarId avatar_{};
+  bool antialiased_ = false;
   uint32_t sh_degree_ = 0;
   std::vector<float> position_m_, covariance_factor_, opacity_,
       sh_;  // copies: the renderer's are valid until its next call

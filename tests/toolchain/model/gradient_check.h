@@ -126,15 +126,25 @@ inline GradientErrors check_splat_gradients(uint32_t sh_degree, uint32_t count,
   return errors;
 }
 
+// What limits Gaussians from below and above the pixel grid; none by default.
+struct Filters {
+  float smallest_extent_m = 0;  // the largest of the texels'; every fifth has none
+  bool antialiased = false;
+};
+
 // The raw head outputs through decoding, skinning and splatting.
-inline GradientErrors check_head_gradients(uint32_t sh_degree) {
+inline GradientErrors check_head_gradients(uint32_t sh_degree, const Filters& filters = {}) {
   const SyntheticBody capsule(16, 14);
   const std::vector<Affine> transforms = capsule.bent();
+  const uint32_t channels = head_channels(sh_degree), texels = capsule.body.texel_count();
+  std::vector<float> smallest;
+  for (uint32_t i = 0; i < texels && filters.smallest_extent_m > 0; ++i)
+    smallest.push_back(filters.smallest_extent_m * static_cast<float>(i % 5) / 4);
   const model::HeadFrame frame{.body = &capsule.body,
                                .texel_position_m = capsule.position,
                                .world_from_rest = transforms,
-                               .decoding = {.sh_degree = sh_degree}};
-  const uint32_t channels = head_channels(sh_degree), texels = capsule.body.texel_count();
+                               .decoding = {.sh_degree = sh_degree},
+                               .smallest_extent_m = smallest};
   std::mt19937 random(270 + sh_degree);
   std::normal_distribution<double> normal;
   std::vector<double> head(size_t(texels) * channels);
@@ -148,7 +158,7 @@ inline GradientErrors check_head_gradients(uint32_t sh_degree) {
                                             .target_m = {0, 0.87f, 0}},
                                            56, 56);
   const model::PixelRect crop{.x = 0, .y = 0, .width = 56, .height = 56};
-  model::Splatter<double> splatter({.threads = 1});
+  model::Splatter<double> splatter({.threads = 1, .antialiased = filters.antialiased});
   model::GaussianBuffer<double> gaussians, gradients;
   const std::function<std::vector<double>()> render = [&] {
     decode_head(frame, head.data(), 1, gaussians);

@@ -160,8 +160,9 @@ TEST_F(RunDirectoryTest, AnOldRunOfEdgeIsWhatItWas) {
 TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritten) {
   TrainSettings settings = network_alone(preset_settings("edge"));
   const nlohmann::json plain = to_json(settings);
-  for (const char* key : {"network", "network_size", "channels", "uv_size", "static_grids",
-                          "static_colour", "static_learning_rate", "clip_gradient"}) {
+  for (const char* key :
+       {"network", "network_size", "channels", "uv_size", "static_grids", "static_colour",
+        "static_learning_rate", "clip_gradient", "smallest_extent", "antialiased"}) {
     EXPECT_FALSE(plain.contains(key)) << key;
   }
   EXPECT_EQ(network_side(settings), 128u);
@@ -169,6 +170,7 @@ TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritte
   settings.network_size = 64;
   settings.channels = 16;
   settings.clip_gradient = 0.5;
+  settings.smallest_extent = settings.antialiased = true;
   settings.static_colour = model::StaticColour::kSum;
   settings.static_learning_rate = 5e-3;
   settings.static_grids = parse_static_grids("colour:T,rest:T/2", "test");
@@ -184,6 +186,8 @@ TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritte
   EXPECT_EQ(layout.statics[1].count, kStaticColour);
   EXPECT_EQ(layout.statics[1].grid_size, 128u);
   EXPECT_EQ(network_channels(read), 16u);
+  EXPECT_TRUE(read.smallest_extent);
+  EXPECT_TRUE(read.antialiased);
 }
 
 TEST_F(RunDirectoryTest, StaticGridsAreRefusedByName) {
