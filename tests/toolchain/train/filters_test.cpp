@@ -44,7 +44,7 @@ TrainRequest filtered(const std::string& run, uint64_t iterations) {
   return both;
 }
 
-TEST(Training, WithFiltersGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
+TEST(TrainingFilters, WithFiltersGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
   const TemporaryFolder folder;
   TrainRequest straight = filtered(folder.path("straight"), 12);
   straight.settings.poses_per_iteration = 2;
@@ -74,7 +74,7 @@ TEST(Training, WithFiltersGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
   EXPECT_TRUE(read_run({straight.run}).json.at("settings").at("antialiased"));
 }
 
-TEST(Training, WithFiltersIsPackedWithThem) {
+TEST(TrainingFilters, WithFiltersIsPackedWithThem) {
   const TemporaryFolder folder;
   const TrainRequest both = filtered(folder.path("run"), 5);
   train_avatar(both);
