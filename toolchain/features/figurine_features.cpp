@@ -198,4 +198,12 @@ std::vector<float> FigurineFeatures::embedding_of(const RgbView& picture) const 
       run_feature_network(weights_, prepare_for_features(picture)).activations, distance_);
 }
 
+torch::Tensor FigurineFeatures::between(const torch::Tensor& seen,
+                                        const torch::Tensor& truth) const {
+  const auto activations = [&](const torch::Tensor& picture) {
+    return run_feature_network(weights_, picture.unsqueeze(0)).activations;
+  };
+  return perceptual_distance(activations(seen), activations(truth), distance_);
+}
+
 }  // namespace figurine::features

@@ -33,6 +33,22 @@ std::vector<float> perceptual_embedding(const std::vector<torch::Tensor>& activa
   return embedding;
 }
 
+torch::Tensor perceptual_distance(const std::vector<torch::Tensor>& a,
+                                  const std::vector<torch::Tensor>& b,
+                                  const std::vector<LayerWeights>& weights) {
+  FIG_CHECK(a.size() == weights.size() && b.size() == weights.size(), "weights for every layer");
+  // A norm whose gradient at zero is zero; that of norms() is infinite there.
+  const auto unit = [](const torch::Tensor& x, double floor) {
+    return x / (at::linalg_vector_norm(x, 2, at::IntArrayRef{1}, true) + floor);
+  };
+  torch::Tensor sum = torch::zeros({}, torch::kFloat);
+  for (size_t l = 0; l < a.size(); ++l) {
+    const torch::Tensor difference = unit(a[l], weights[l].floor) - unit(b[l], weights[l].floor);
+    sum = sum + (difference.square() * weights[l].channels.view({1, -1, 1, 1})).sum(1).mean();
+  }
+  return sum;
+}
+
 std::vector<double> layer_norms(const std::vector<torch::Tensor>& activations) {
   const torch::NoGradGuard no_gradient;
   std::vector<double> means;

@@ -27,6 +27,12 @@ struct LayerWeights {
 std::vector<float> perceptual_embedding(const std::vector<torch::Tensor>& activations,
                                         const std::vector<LayerWeights>& weights);
 
+// The distance itself, a scalar, for losses: differentiable by both. Where a position's activations
+// are all zero, nothing of it is passed on.
+torch::Tensor perceptual_distance(const std::vector<torch::Tensor>& a,
+                                  const std::vector<torch::Tensor>& b,
+                                  const std::vector<LayerWeights>& weights);
+
 // Mean over the positions of |a|, one a layer.
 std::vector<double> layer_norms(const std::vector<torch::Tensor>& activations);
 
