@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "figurine/gaussian.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/cli/train_all.h"

@@ -47,9 +47,13 @@ int64_t feature_parameter_count();
 // [P]: normal of variance 2 / inputs (He), biases zero.
 torch::Tensor initial_feature_weights(uint64_t seed);
 
+// Of the stages, [n,C,H,W], as below.
+std::vector<torch::Tensor> feature_activations(const torch::Tensor& weights,
+                                               const torch::Tensor& pictures);
+
 struct FeatureOutput {
-  std::vector<torch::Tensor> activations;  // of the stages, [n,C,H,W]
-  torch::Tensor features;                  // [n,F], every row of length sqrt(F)
+  std::vector<torch::Tensor> activations;
+  torch::Tensor features;  // [n,F], every row of length sqrt(F)
 };
 // weights: [P]; pictures: [n,3,H,W] in [0,1], 128 x 128 wherever the features are looked at.
 // Differentiable by both.

@@ -33,17 +33,16 @@ std::vector<float> perceptual_embedding(const std::vector<torch::Tensor>& activa
   return embedding;
 }
 
-torch::Tensor perceptual_distance(const std::vector<torch::Tensor>& a,
-                                  const std::vector<torch::Tensor>& b,
+torch::Tensor perceptual_distance(const std::vector<torch::Tensor>& activations,
                                   const std::vector<LayerWeights>& weights) {
-  FIG_CHECK(a.size() == weights.size() && b.size() == weights.size(), "weights for every layer");
-  // A norm whose gradient at zero is zero; that of norms() is infinite there.
-  const auto unit = [](const torch::Tensor& x, double floor) {
-    return x / (at::linalg_vector_norm(x, 2, at::IntArrayRef{1}, true) + floor);
-  };
+  FIG_CHECK(activations.size() == weights.size(), "weights for every layer");
   torch::Tensor sum = torch::zeros({}, torch::kFloat);
-  for (size_t l = 0; l < a.size(); ++l) {
-    const torch::Tensor difference = unit(a[l], weights[l].floor) - unit(b[l], weights[l].floor);
+  for (size_t l = 0; l < activations.size(); ++l) {
+    const torch::Tensor& a = activations[l];
+    // A norm whose gradient at zero is zero; that of norms() is infinite there.
+    const torch::Tensor unit =
+        a / (at::linalg_vector_norm(a, 2, at::IntArrayRef{1}, true) + weights[l].floor);
+    const torch::Tensor difference = unit.narrow(0, 0, 1) - unit.narrow(0, 1, 1);
     sum = sum + (difference.square() * weights[l].channels.view({1, -1, 1, 1})).sum(1).mean();
   }
   return sum;

@@ -105,7 +105,7 @@ struct LpipsAlex::Weights {
   std::vector<LayerWeights> distance;       // of the layers
   torch::Tensor shift, scale;               // [1,3,1,1]
 
-  // pictures: [1,3,H,W] in [0,1]. Differentiable by them.
+  // pictures: [n,3,H,W] in [0,1]. Differentiable by them.
   std::vector<torch::Tensor> activations(const torch::Tensor& pictures) const;
 };
 
@@ -166,8 +166,8 @@ std::vector<float> LpipsAlex::embedding_of(const RgbView& picture) const {
 uint32_t LpipsAlex::least_side_px() const { return kLeastAlexNetSide_px; }
 
 torch::Tensor LpipsAlex::between(const torch::Tensor& seen, const torch::Tensor& truth) const {
-  return perceptual_distance(weights_->activations(seen.unsqueeze(0)),
-                             weights_->activations(truth.unsqueeze(0)), weights_->distance);
+  return perceptual_distance(weights_->activations(torch::stack({seen, truth})),
+                             weights_->distance);
 }
 
 struct InceptionFeatures::Script {

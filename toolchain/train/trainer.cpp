@@ -1,9 +1,9 @@
 #include "toolchain/train/trainer.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <set>
 
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/error.h"
@@ -545,25 +545,29 @@ std::vector<std::string> everybody(const TrainRequest& request) {
   return folders;
 }
 
-// A person's run inside the training's folder, called as the data folder is.
-std::string folder_of(const std::string& data) {
-  return std::filesystem::path(data).filename().string();
+// The people's runs inside the training's folder, called as the data folders are. Captures of
+// several seeds have people of one name: the second is NAME_2.
+std::vector<std::string> run_names(const std::vector<std::string>& data) {
+  std::vector<std::string> names;
+  for (const std::string& path : data) {
+    const std::string name = std::filesystem::path(path).filename().string();
+    std::string unique = name;
+    for (int i = 2; std::find(names.begin(), names.end(), unique) != names.end(); ++i)
+      unique = name + "_" + std::to_string(i);
+    names.push_back(unique);
+  }
+  return names;
 }
 
 void check_people(const std::vector<std::string>& data, const TrainSettings& settings) {
-  if (data.size() == 1) return;
-  if (!settings.network || settings.static_grids.empty())
+  if (data.size() > 1 && (!settings.network || settings.static_grids.empty()))
     throw InputError("settings: static_grids: people who share a network need values of their own");
-  std::set<std::string> folders;
-  for (const std::string& path : data) {
-    if (!folders.insert(folder_of(path)).second)
-      throw InputError(path + ": is the second folder called " + folder_of(path));
-  }
 }
 
 nlohmann::json list_people(const std::vector<std::string>& data) {
   nlohmann::json people = nlohmann::json::array();
-  for (const std::string& path : data) people.push_back({{"data", path}, {"run", folder_of(path)}});
+  const std::vector<std::string> names = run_names(data);
+  for (size_t p = 0; p < data.size(); ++p) people.push_back({{"data", data[p]}, {"run", names[p]}});
   return people;
 }
 
@@ -638,7 +642,7 @@ TrainResult train_avatar(const TrainRequest& request) {
     RunDirectory own = run;
     nlohmann::json said;
     if (paths.size() > 1) {
-      own.path += "/" + folder_of(paths[p]);
+      own.path += "/" + run_names(paths)[p];
       said = exists ? read_json(own.run_json()) : describe(p);
       said["one_of"] = paths.size();
     }
