@@ -7,10 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "figurine/gaussian.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/cli/train_all.h"
 #include "toolchain/error.h"
+#include "toolchain/features/feature_network.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/train/threads.h"
@@ -26,16 +28,19 @@ constexpr uint32_t kDefaultOctaves = 5;
 
 // As typed; what was not given comes from the preset, or from the run that is resumed.
 struct AvatarArguments {
-  std::string data, body, run;
+  std::vector<std::string> data;  // of everybody who is to share a network
+  std::string body, run;
   bool all = false, resume = false, quiet = false;
   std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser,
-      standoff, network, static_grids, static_colour, smallest_extent, antialiased;
+      standoff, network, static_grids, static_colour, smallest_extent, antialiased, perceptual;
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay, static_learning_rate, static_penalty,
       clip_gradient;
-  std::optional<float> spacing_scale;
-  std::optional<uint32_t> warmup, views, poses, uv, network_size, channels;
-  bool freeze_pose = false;
+  std::optional<float> spacing_scale, perceptual_weight;
+  std::optional<uint32_t> warmup, views, poses, uv, network_size, channels, sh_degree,
+      perceptual_window;
+  std::optional<uint32_t> network_rank;
+  bool freeze_pose = false, freeze_network = false;
   uint32_t threads = 0;  // 0: all cores, with --all one
   uint32_t slots = 0;    // 0: as many as the threads leave cores for
 };
@@ -73,6 +78,29 @@ void overlay_parts(const AvatarArguments& arguments, train::TrainSettings& setti
   if (arguments.clip_gradient) settings.clip_gradient = *arguments.clip_gradient;
   if (arguments.smallest_extent) settings.smallest_extent = *arguments.smallest_extent == "on";
   if (arguments.antialiased) settings.antialiased = *arguments.antialiased == "on";
+  if (arguments.freeze_network || arguments.network_rank) settings.freeze_network = true;
+  if (arguments.network_rank) settings.network_rank = *arguments.network_rank;
+}
+
+void overlay_perceptual(const AvatarArguments& arguments, train::PerceptualSettings& settings) {
+  if (arguments.perceptual && *arguments.perceptual == "none") settings = {};
+  if (arguments.perceptual && *arguments.perceptual != "none")
+    settings.file = *arguments.perceptual;
+  if (arguments.perceptual_weight) settings.weight = *arguments.perceptual_weight;
+  if (arguments.perceptual_window) settings.window_px = *arguments.perceptual_window;
+}
+
+// Opens the network that the settings name. A run goes on with the very file that it began with.
+void open_perceptual(train::TrainRequest& request, const std::string& hash_of_run) {
+  train::PerceptualSettings& settings = request.settings.perceptual;
+  if (settings.file.empty()) return;
+  const features::LossNetwork network = features::open_loss_network(settings.file);
+  if (!hash_of_run.empty() && network.hash != hash_of_run) {
+    throw InputError(settings.file + ": hash: is " + network.hash + ", " + request.run +
+                     " was trained with " + hash_of_run);
+  }
+  request.perceptual = network.distance;
+  settings.name = network.name, settings.hash = network.hash;
 }
 
 void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
@@ -88,6 +116,8 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
                                    : uint32_t(std::stoul(*arguments.fourier));
   }
   overlay_parts(arguments, settings);
+  overlay_perceptual(arguments, settings.perceptual);
+  if (arguments.sh_degree) settings.decoding.sh_degree = *arguments.sh_degree;
   if (arguments.seed) settings.seed = *arguments.seed;
   if (arguments.init) settings.init = *arguments.init;
   if (arguments.learning_rate) settings.schedule.peak = *arguments.learning_rate;
@@ -141,23 +171,27 @@ void say_threads(const std::string& run, uint32_t before, uint32_t now) {
   }
 }
 
-train::TrainRequest make_request(const AvatarArguments& arguments, const std::string& data,
-                                 const std::string& run) {
-  train::TrainRequest request{.data = data,
+// data: of one person, or of several who share a network.
+train::TrainRequest make_request(const AvatarArguments& arguments,
+                                 const std::vector<std::string>& data, const std::string& run) {
+  train::TrainRequest request{.data = data.empty() ? "" : data.front(),
+                              .more_data = {},
                               .body = arguments.body,
                               .run = run,
                               .settings = {},
                               .command = train::current_command(),
                               .resume = arguments.resume,
                               .quiet = arguments.quiet};
+  if (data.size() > 1) request.more_data.assign(data.begin() + 1, data.end());
   if (arguments.resume && fs::exists(train::RunDirectory{run}.run_json())) {
     const train::RunDescription old = train::read_run({run});
-    if (request.data.empty()) request.data = old.data;
+    if (request.data.empty()) request.data = old.data, request.more_data = old.more_data;
     if (request.body.empty()) request.body = old.body;
     request.settings = old.settings;
     if (arguments.preset && *arguments.preset != old.settings.preset)
       throw InputError(run + ": --preset differs from the run that is resumed");
     overlay(arguments, request.settings);
+    open_perceptual(request, old.settings.perceptual.hash);
     const nlohmann::json asked = train::to_json(request.settings),
                          was = train::to_json(old.settings);
     // What has its default may be left out of either.
@@ -179,6 +213,7 @@ train::TrainRequest make_request(const AvatarArguments& arguments, const std::st
     request.settings = train::preset_settings(arguments.preset.value_or("edge"));
     request.settings.bf16 = train::has_fast_bf16();
     overlay(arguments, request.settings);
+    open_perceptual(request, "");
     request.settings.threads = thread_count(arguments);
   }
   return request;
@@ -237,6 +272,13 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
       ->add_option("--static-penalty", arguments.static_penalty,
                    "Weight of the static values' mean square in the loss (default 0)")
       ->check(CLI::NonNegativeNumber);
+  command->add_flag("--freeze-network", arguments.freeze_network,
+                    "The network of --init stays: only the static values learn");
+  command
+      ->add_option("--network-rank", arguments.network_rank,
+                   "The network of --init stays, but for a residual of this rank on its kernels, "
+                   "which learns beside the static values; packages hold the sum")
+      ->check(CLI::Range(1, 256));
   command
       ->add_option("--clip-gradient", arguments.clip_gradient,
                    "Largest norm of an iteration's gradients; run.json says the last (default 0: "
@@ -257,11 +299,33 @@ void add_filter_options(CLI::App* command, AvatarArguments& arguments) {
       ->check(CLI::IsMember({"on", "off"}));
 }
 
+void add_perceptual_options(CLI::App* command, AvatarArguments& arguments) {
+  CLI::Option* network = command->add_option(
+      "--perceptual", arguments.perceptual,
+      "Network of a perceptual loss: .safetensors of figurine-train features, AlexNet and LPIPS' "
+      "weights as .npz or TorchScript (docs/features.md), or none (default)");
+  command
+      ->add_option("--perceptual-weight", arguments.perceptual_weight,
+                   "Of the distance that it sees, beside 1 for L1 (default 0.01, the paper's)")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(network);
+  command
+      ->add_option("--perceptual-window", arguments.perceptual_window,
+                   "Side in pixels of what it looks at in every picture, at a random place on the "
+                   "person; 0: all of it (default 128)")
+      ->check(CLI::Range(0, 4096))
+      ->needs(network);
+}
+
 void add_avatar_command(CLI::App& app) {
   auto arguments = std::make_shared<AvatarArguments>();
   CLI::App* command = app.add_subcommand("avatar", "Train one person's avatar from a capture");
-  command->add_option("--data", arguments->data,
-                      "Folder of one identity (with --all: of identities)");
+  command
+      ->add_option("--data", arguments->data,
+                   "Folder of one identity (with --all: of identities). Given several times: one "
+                   "network for all of them, static values for each, whose runs are folders in the "
+                   "run's")
+      ->allow_extra_args(false);
   command->add_option("--body", arguments->body, "Body package (figurine-train body)");
   command->add_option("-o,--output", arguments->run, "Folder of the run (with --all: of runs)")
       ->required();
@@ -294,6 +358,10 @@ void add_avatar_command(CLI::App& app) {
                    "Octaves of constant Fourier channels in the input, 1 to 10, or on (5) or off "
                    "(default: the preset's)")
       ->check(CLI::IsMember({"on", "off"}) | CLI::Range(1, 10));
+  command
+      ->add_option("--sh-degree", arguments->sh_degree,
+                   "Of the colours' spherical harmonics (default: the preset's)")
+      ->check(CLI::Range(uint32_t{0}, kMaxShDegree));
   command
       ->add_option("--learning-rate", arguments->learning_rate,
                    "Peak of the schedule (default 2e-3)")
@@ -345,14 +413,15 @@ void add_avatar_command(CLI::App& app) {
       ->check(CLI::Range(1, 256));
   add_part_options(command, *arguments);
   add_filter_options(command, *arguments);
+  add_perceptual_options(command, *arguments);
   command->callback([arguments] {
     if (arguments->all) {
-      if (arguments->data.empty()) throw InputError("--all needs --data");
+      if (arguments->data.size() != 1) throw InputError("--all needs one --data");
+      const std::string& folder = arguments->data.front();
       const auto request_of = [&](const std::string& identity) {
-        return make_request(*arguments, arguments->data + "/" + identity,
-                            arguments->run + "/" + identity);
+        return make_request(*arguments, {folder + "/" + identity}, arguments->run + "/" + identity);
       };
-      train_all({.data = arguments->data,
+      train_all({.data = folder,
                  .runs = arguments->run,
                  .slots = slot_count(*arguments),
                  .quiet = arguments->quiet},

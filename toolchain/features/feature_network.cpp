@@ -1,5 +1,7 @@
 #include "toolchain/features/feature_network.h"
 
+#include <filesystem>
+
 #include "figurine/check.h"
 #include "figurine/package.h"
 #include "ports/host/files.h"
@@ -94,6 +96,15 @@ std::string hash_of_file(const std::string& path) {
   if (!file.ok()) throw InputError(file.status().message());
   const std::span<const std::byte> bytes = file.value().bytes();
   return format_hash(hash_picture({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()}));
+}
+
+LossNetwork open_loss_network(const std::string& path) {
+  const auto described = [&](auto network) {
+    return LossNetwork{network, network->name(), hash_of_file(path)};
+  };
+  if (std::filesystem::path(path).extension() == ".safetensors")
+    return described(std::make_shared<const FigurineFeatures>(FigurineFeatures::load(path)));
+  return described(std::make_shared<const LpipsAlex>(LpipsAlex::load(path)));
 }
 
 ComparingNetworks open_networks(const NetworkFiles& files) {

@@ -24,6 +24,10 @@
 #include "toolchain/measure/metrics.h"
 #include "toolchain/measure/weight_space.h"
 
+namespace figurine::model {
+class PictureDistance;
+}
+
 namespace figurine::features {
 
 // One picture of RgbPictures, borrowed.
@@ -100,6 +104,16 @@ struct ComparingNetworks {
 
 // XXH3-128 of a file's bytes, as hexadecimal digits. Throws InputError.
 std::string hash_of_file(const std::string& path);
+
+// What a perceptual loss looks through (toolchain/model/perceptual.h).
+struct LossNetwork {
+  std::shared_ptr<const model::PictureDistance> distance;
+  std::string name, hash;  // of the network, of its file
+};
+
+// .safetensors: figurine-features; else AlexNet and LPIPS' weights, .npz or TorchScript. Throws
+// InputError naming file, layer and reason.
+LossNetwork open_loss_network(const std::string& path);
 
 // Throws InputError naming file, layer and reason.
 ComparingNetworks open_networks(const NetworkFiles& files);

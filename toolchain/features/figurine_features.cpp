@@ -90,16 +90,23 @@ torch::Tensor initial_feature_weights(uint64_t seed) {
   return weights;
 }
 
-FeatureOutput run_feature_network(const torch::Tensor& weights, const torch::Tensor& pictures) {
-  FeatureOutput out;
+std::vector<torch::Tensor> feature_activations(const torch::Tensor& weights,
+                                               const torch::Tensor& pictures) {
+  std::vector<torch::Tensor> activations;
   torch::Tensor x = (pictures - 0.5) * 4;
-  size_t next = 0;
-  for (const FeatureStage& stage : kFeatureStages) {
-    x = torch::relu(model::conv2d(x, part(weights, next), part(weights, next + 1), stage.stride,
+  for (size_t l = 0; l < kFeatureLayers; ++l) {
+    const FeatureStage& stage = kFeatureStages[l];
+    x = torch::relu(model::conv2d(x, part(weights, 2 * l), part(weights, 2 * l + 1), stage.stride,
                                   stage.kernel / 2));
-    out.activations.push_back(x);
-    next += 2;
+    activations.push_back(x);
   }
+  return activations;
+}
+
+FeatureOutput run_feature_network(const torch::Tensor& weights, const torch::Tensor& pictures) {
+  FeatureOutput out{feature_activations(weights, pictures), {}};
+  const torch::Tensor& x = out.activations.back();
+  const size_t next = 2 * kFeatureLayers;
   const torch::Tensor pooled = torch::cat({x.mean({2, 3}), x.amax({2, 3})}, 1);
   const torch::Tensor features =
       torch::linear(pooled, part(weights, next), part(weights, next + 1));
@@ -196,6 +203,11 @@ std::vector<float> FigurineFeatures::embedding_of(const RgbView& picture) const 
   const torch::NoGradGuard no_gradient;
   return perceptual_embedding(
       run_feature_network(weights_, prepare_for_features(picture)).activations, distance_);
+}
+
+torch::Tensor FigurineFeatures::between(const torch::Tensor& seen,
+                                        const torch::Tensor& truth) const {
+  return perceptual_distance(feature_activations(weights_, torch::stack({seen, truth})), distance_);
 }
 
 }  // namespace figurine::features

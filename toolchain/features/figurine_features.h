@@ -18,6 +18,7 @@
 
 #include "toolchain/features/feature_network.h"
 #include "toolchain/features/perceptual_embedding.h"
+#include "toolchain/model/perceptual.h"
 #include "toolchain/tensor.h"
 
 namespace figurine::features {
@@ -46,17 +47,24 @@ int64_t feature_parameter_count();
 // [P]: normal of variance 2 / inputs (He), biases zero.
 torch::Tensor initial_feature_weights(uint64_t seed);
 
+// Of the stages, [n,C,H,W], as below.
+std::vector<torch::Tensor> feature_activations(const torch::Tensor& weights,
+                                               const torch::Tensor& pictures);
+
 struct FeatureOutput {
-  std::vector<torch::Tensor> activations;  // of the stages, [n,C,H,W]
-  torch::Tensor features;                  // [n,F], every row of length sqrt(F)
+  std::vector<torch::Tensor> activations;
+  torch::Tensor features;  // [n,F], every row of length sqrt(F)
 };
-// weights: [P]; pictures: [n,3,128,128] in [0,1]. Differentiable by the weights.
+// weights: [P]; pictures: [n,3,H,W] in [0,1], 128 x 128 wherever the features are looked at.
+// Differentiable by both.
 FeatureOutput run_feature_network(const torch::Tensor& weights, const torch::Tensor& pictures);
 
 // [1,3,128,128] of a square picture of any size. Throws InputError if it is not square.
 torch::Tensor prepare_for_features(const RgbView& picture);
 
-class FigurineFeatures : public FeatureNetwork, public PerceptualNetwork {
+class FigurineFeatures : public FeatureNetwork,
+                         public PerceptualNetwork,
+                         public model::PictureDistance {
  public:
   // distance: of every layer. provenance: as the file's metadata.
   FigurineFeatures(torch::Tensor weights, std::vector<LayerWeights> distance,
@@ -69,6 +77,10 @@ class FigurineFeatures : public FeatureNetwork, public PerceptualNetwork {
   nlohmann::json describe() const override;
   size_t dimension() const override { return kFeatureDimension; }
   const std::map<std::string, std::string>& provenance() const { return provenance_; }
+
+  // In a loss pictures keep their own size, and need not be square.
+  uint32_t least_side_px() const override { return 1; }
+  torch::Tensor between(const torch::Tensor& seen, const torch::Tensor& truth) const override;
 
  private:
   void features_of(const RgbView& picture, std::span<double> features) const override;

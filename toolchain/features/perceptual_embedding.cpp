@@ -33,6 +33,21 @@ std::vector<float> perceptual_embedding(const std::vector<torch::Tensor>& activa
   return embedding;
 }
 
+torch::Tensor perceptual_distance(const std::vector<torch::Tensor>& activations,
+                                  const std::vector<LayerWeights>& weights) {
+  FIG_CHECK(activations.size() == weights.size(), "weights for every layer");
+  torch::Tensor sum = torch::zeros({}, torch::kFloat);
+  for (size_t l = 0; l < activations.size(); ++l) {
+    const torch::Tensor& a = activations[l];
+    // A norm whose gradient at zero is zero; that of norms() is infinite there.
+    const torch::Tensor unit =
+        a / (at::linalg_vector_norm(a, 2, at::IntArrayRef{1}, true) + weights[l].floor);
+    const torch::Tensor difference = unit.narrow(0, 0, 1) - unit.narrow(0, 1, 1);
+    sum = sum + (difference.square() * weights[l].channels.view({1, -1, 1, 1})).sum(1).mean();
+  }
+  return sum;
+}
+
 std::vector<double> layer_norms(const std::vector<torch::Tensor>& activations) {
   const torch::NoGradGuard no_gradient;
   std::vector<double> means;

@@ -27,6 +27,13 @@ struct LayerWeights {
 std::vector<float> perceptual_embedding(const std::vector<torch::Tensor>& activations,
                                         const std::vector<LayerWeights>& weights);
 
+// The distance itself, a scalar, for losses: differentiable by both pictures, whose activations are
+// [2,C,H,W] each. Two pictures at once, because LibTorch leaves oneDNN for BLAS, and BLAS's
+// threads, where one alone is small. Where a position's activations are all zero, nothing is passed
+// on.
+torch::Tensor perceptual_distance(const std::vector<torch::Tensor>& activations,
+                                  const std::vector<LayerWeights>& weights);
+
 // Mean over the positions of |a|, one a layer.
 std::vector<double> layer_norms(const std::vector<torch::Tensor>& activations);
 

@@ -104,7 +104,21 @@ struct LpipsAlex::Weights {
   std::vector<torch::Tensor> weight, bias;  // of the layers
   std::vector<LayerWeights> distance;       // of the layers
   torch::Tensor shift, scale;               // [1,3,1,1]
+
+  // pictures: [n,3,H,W] in [0,1]. Differentiable by them.
+  std::vector<torch::Tensor> activations(const torch::Tensor& pictures) const;
 };
+
+std::vector<torch::Tensor> LpipsAlex::Weights::activations(const torch::Tensor& pictures) const {
+  torch::Tensor x = (pictures * 2 - 1 - shift) / scale;
+  std::vector<torch::Tensor> out;
+  for (size_t l = 0; l < std::size(kAlexNet); ++l) {
+    if (kAlexNet[l].pooled_before) x = torch::max_pool2d(x, 3, 2);
+    x = torch::relu(model::conv2d(x, weight[l], bias[l], kAlexNet[l].stride, kAlexNet[l].padding));
+    out.push_back(x);
+  }
+  return out;
+}
 
 LpipsAlex::LpipsAlex(std::unique_ptr<Weights> weights) : weights_(std::move(weights)) {}
 LpipsAlex::LpipsAlex(LpipsAlex&&) noexcept = default;
@@ -146,15 +160,14 @@ std::vector<float> LpipsAlex::embedding_of(const RgbView& picture) const {
                      std::to_string(picture.width_px) + "x" + std::to_string(picture.height_px));
   }
   const torch::NoGradGuard no_gradient;
-  torch::Tensor x = (to_tensor(picture) * 2 - 1 - weights_->shift) / weights_->scale;
-  std::vector<torch::Tensor> activations;
-  for (size_t l = 0; l < std::size(kAlexNet); ++l) {
-    if (kAlexNet[l].pooled_before) x = torch::max_pool2d(x, 3, 2);
-    x = torch::relu(model::conv2d(x, weights_->weight[l], weights_->bias[l], kAlexNet[l].stride,
-                                  kAlexNet[l].padding));
-    activations.push_back(x);
-  }
-  return perceptual_embedding(activations, weights_->distance);
+  return perceptual_embedding(weights_->activations(to_tensor(picture)), weights_->distance);
+}
+
+uint32_t LpipsAlex::least_side_px() const { return kLeastAlexNetSide_px; }
+
+torch::Tensor LpipsAlex::between(const torch::Tensor& seen, const torch::Tensor& truth) const {
+  return perceptual_distance(weights_->activations(torch::stack({seen, truth})),
+                             weights_->distance);
 }
 
 struct InceptionFeatures::Script {

@@ -13,10 +13,11 @@
 #include <vector>
 
 #include "toolchain/features/feature_network.h"
+#include "toolchain/model/perceptual.h"
 
 namespace figurine::features {
 
-class LpipsAlex : public PerceptualNetwork {
+class LpipsAlex : public PerceptualNetwork, public model::PictureDistance {
  public:
   // .npz, or TorchScript otherwise, with the arrays as the authors' LPIPS(net="alex").state_dict()
   // names them. Throws InputError naming file, array and reason.
@@ -26,6 +27,9 @@ class LpipsAlex : public PerceptualNetwork {
 
   const std::string& name() const override;
   nlohmann::json describe() const override;
+
+  uint32_t least_side_px() const override;
+  torch::Tensor between(const torch::Tensor& seen, const torch::Tensor& truth) const override;
 
  private:
   struct Weights;

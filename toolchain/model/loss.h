@@ -2,7 +2,7 @@
 // threaded C++.
 //
 // Weights are the paper's, 1.0 / 0.1 / 0.1, for L1, 1 - SSIM and L1 of the mask; its LPIPS term
-// (0.01) is left out: no pretrained AlexNet can be had from the platform's packages.
+// (0.01) is perceptual.h.
 #pragma once
 
 #include <array>

@@ -244,6 +244,7 @@ void PoseUNet::set_fake_quantisation(std::shared_ptr<const FakeQuantisation> qua
 }
 
 torch::Tensor& PoseUNet::weights() { return impl_->weights; }
+const torch::Tensor& PoseUNet::weights() const { return impl_->weights; }
 torch::Tensor& PoseUNet::gradients() { return impl_->weights.mutable_grad(); }
 void PoseUNet::zero_gradients() { impl_->weights.mutable_grad() = torch::Tensor(); }
 
@@ -277,6 +278,16 @@ std::vector<ParameterGroup> PoseUNet::muon_groups() const {
     groups.push_back({slot.bias, slot.end(), 0});
   }
   return groups;
+}
+
+std::vector<KernelMatrix> PoseUNet::kernels() const {
+  std::vector<KernelMatrix> kernels;
+  for (size_t i = 0; i < impl_->plan->slots.size(); ++i) {
+    const ConvolutionSlot& slot = impl_->plan->slots[i];
+    if (impl_->plan->network.layers[i].op == LayerOp::kConv2d)
+      kernels.push_back({slot.weights, slot.out, slot.kernel * slot.kernel * slot.in});
+  }
+  return kernels;
 }
 
 Network PoseUNet::export_network(std::vector<float>& storage) const {

@@ -29,6 +29,11 @@ struct PoseUNetOptions {
       0.3f;  // initial bias of the head's three SH degree 0 channels; all other biases are zero
 };
 
+// Where a convolution's kernel lies in the flat weights: [rows, columns] = [out, k*k*in].
+struct KernelMatrix {
+  int64_t begin = 0, rows = 0, columns = 0;
+};
+
 class PoseUNet {
  public:
   // network: shapes only (its weights, if any, are not read). Throws InputError if it is unsound.
@@ -49,6 +54,7 @@ class PoseUNet {
   void set_fake_quantisation(std::shared_ptr<const FakeQuantisation> quantisation);
 
   torch::Tensor& weights();  // [P] flat float; a leaf that requires a gradient
+  const torch::Tensor& weights() const;
   torch::Tensor&
   gradients();  // [P] flat float; backward passes add to it, undefined before the first
   void zero_gradients();
@@ -61,6 +67,7 @@ class PoseUNet {
   std::vector<uint64_t> token_lengths() const;  // per convolution: kernel + bias
   // Where Muon and AdamW each update: kernels but the head's are matrices [out, k*k*in].
   std::vector<ParameterGroup> muon_groups() const;
+  std::vector<KernelMatrix> kernels() const;  // of all convolutions, the head's last
 
   // The network with weights: spans into `storage`, which is filled with a copy of the flat
   // weights.

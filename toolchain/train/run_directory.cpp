@@ -14,6 +14,7 @@
 
 #include "ports/host/files.h"
 #include "toolchain/error.h"
+#include "toolchain/model/low_rank.h"
 #include "toolchain/model/optimiser.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/tensor_operations.h"
@@ -98,19 +99,20 @@ void take_weights(const std::string& path, const TensorFile& file, model::PoseUN
 
 std::string static_name(size_t group) { return "static." + std::to_string(group); }
 
-void add_statics(const StaticMap& statics, TensorFile& file) {
+void add_statics(const StaticMap& statics, TensorFile& file, const std::string& prefix = "") {
   const float* from = statics.empty() ? nullptr : statics.values.const_data_ptr<float>();
   for (size_t g = 0; g < statics.shapes.size(); ++g) {
     const auto [cells, channels] = statics.shapes[g];
-    file.tensors[static_name(g)] = {{cells, channels}, {from, from + cells * channels}};
+    file.tensors[prefix + static_name(g)] = {{cells, channels}, {from, from + cells * channels}};
     from += cells * channels;
   }
 }
 
-void take_statics(const std::string& path, const TensorFile& file, StaticMap& statics) {
+void take_statics(const std::string& path, const TensorFile& file, StaticMap& statics,
+                  const std::string& prefix = "") {
   float* to = statics.empty() ? nullptr : statics.values.mutable_data_ptr<float>();
   for (size_t g = 0; g < statics.shapes.size(); ++g) {
-    const std::string name = static_name(g);
+    const std::string name = prefix + static_name(g);
     const auto found = file.tensors.find(name);
     if (found == file.tensors.end()) throw InputError(path + ": " + name + ": missing");
     const auto [cells, channels] = statics.shapes[g];
@@ -172,6 +174,19 @@ void take_optimiser(const std::string& path, const TensorFile& file, const std::
   optimiser.steps = static_cast<int64_t>(parse_double(path, file.metadata, prefix + "_steps"));
 }
 
+void add_residual(const model::LowRankResidual& residual, TensorFile& file) {
+  file.tensors["residual.base"] = flat_tensor(residual.base());
+  file.tensors["residual.factors"] = flat_tensor(residual.factors());
+}
+
+void take_residual(const std::string& path, const TensorFile& file,
+                   model::LowRankResidual& residual) {
+  take_flat_tensor(file, path, "residual.base", residual.base());
+  take_flat_tensor(file, path, "residual.factors", residual.factors());
+}
+
+std::string person_prefix(size_t further) { return "person." + std::to_string(further + 1) + "."; }
+
 std::string weights_file(const std::string& path) {
   return std::filesystem::is_directory(path) ? RunDirectory{path}.weights() : path;
 }
@@ -185,6 +200,7 @@ constexpr StageField kStageFields[] = {{"seconds_data", &StageSeconds::data},
                                        {"seconds_compose", &StageSeconds::compose},
                                        {"seconds_splat_forward", &StageSeconds::splat_forward},
                                        {"seconds_loss", &StageSeconds::loss},
+                                       {"seconds_perceptual", &StageSeconds::perceptual},
                                        {"seconds_splat_backward", &StageSeconds::splat_backward},
                                        {"seconds_unet_backward", &StageSeconds::unet_backward},
                                        {"seconds_optimiser", &StageSeconds::optimiser}};
@@ -216,11 +232,16 @@ void load_initial_weights(const std::string& path, const LearnedParts& parts) {
 }
 
 void save_checkpoint(const RunDirectory& run, const TrainingState& state, const LearnedParts& parts,
-                     const PartOptimisers& optimisers) {
+                     const PartOptimisers& optimisers, const std::vector<FurtherPerson>& further) {
   TensorFile file;
   add_parts(parts, file);
   if (optimisers.unet != nullptr) add_optimiser("optimiser", *optimisers.unet, file);
   if (optimisers.statics != nullptr) add_optimiser("static_optimiser", *optimisers.statics, file);
+  if (parts.residual != nullptr) add_residual(*parts.residual, file);
+  for (size_t p = 0; p < further.size(); ++p) {
+    add_statics(*further[p].statics, file, person_prefix(p));
+    add_optimiser(person_prefix(p) + "static_optimiser", *further[p].optimiser, file);
+  }
   file.metadata["iteration"] = exact(static_cast<double>(state.iteration));
   file.metadata["seconds"] = exact(state.seconds);
   for (const StageField& field : kStageFields)
@@ -229,21 +250,29 @@ void save_checkpoint(const RunDirectory& run, const TrainingState& state, const 
 }
 
 TrainingState load_checkpoint(const RunDirectory& run, const LearnedParts& parts,
-                              const PartOptimisers& optimisers) {
+                              const PartOptimisers& optimisers,
+                              const std::vector<FurtherPerson>& further) {
   const std::string path = run.checkpoint();
   const TensorFile file = read_tensor_file(path);
   TrainingState state;
   state.iteration = static_cast<uint64_t>(parse_double(path, file.metadata, "iteration"));
   state.seconds = parse_double(path, file.metadata, "seconds");
   for (const StageField& field : kStageFields) {
-    // Checkpoints of before there was such a stage say nothing of it.
-    if (file.metadata.contains(field.name) || field.member != &StageSeconds::compose)
+    // Checkpoints of before there were these stages say nothing of them.
+    const bool may_lack =
+        field.member == &StageSeconds::compose || field.member == &StageSeconds::perceptual;
+    if (file.metadata.contains(field.name) || !may_lack)
       state.stages.*field.member = parse_double(path, file.metadata, field.name);
   }
   take_parts(path, file, parts);
   if (optimisers.unet != nullptr) take_optimiser(path, file, "optimiser", *optimisers.unet);
   if (optimisers.statics != nullptr)
     take_optimiser(path, file, "static_optimiser", *optimisers.statics);
+  if (parts.residual != nullptr) take_residual(path, file, *parts.residual);
+  for (size_t p = 0; p < further.size(); ++p) {
+    take_statics(path, file, *further[p].statics, person_prefix(p));
+    take_optimiser(path, file, person_prefix(p) + "static_optimiser", *further[p].optimiser);
+  }
   return state;
 }
 

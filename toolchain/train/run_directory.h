@@ -8,7 +8,8 @@
 //                            static.G [M,channels], a static part's values group by group; and
 //                            smallest_extent.scale_m [1], .code [N], if the run has such
 //   checkpoint.safetensors   the same and what --resume needs: the optimisers' moments, iteration,
-//                            seconds
+//                            seconds; a residual's base and factors; under person.N. the static
+//                            values of the people beyond the first, where several share a network
 //   evaluation.json          by figurine-train evaluate reconstruction
 //
 // Every file appears whole or not at all.
@@ -22,8 +23,9 @@
 #include "toolchain/train/tensor_file.h"
 
 namespace figurine::model {
-class PoseUNet;
+class LowRankResidual;
 class Optimiser;
+class PoseUNet;
 }  // namespace figurine::model
 
 namespace figurine::train {
@@ -46,13 +48,14 @@ struct StageSeconds {
   double unet_forward = 0;
   double compose = 0;  // head from network and static values, forward and backward
   double splat_forward = 0;
-  double loss = 0;  // forward and backward: they are fused
+  double loss = 0;        // forward and backward: they are fused
+  double perceptual = 0;  // its perceptual term, forward and backward
   double splat_backward = 0;
   double unet_backward = 0;
   double optimiser = 0;
   double total() const {
-    return data + unet_forward + compose + splat_forward + loss + splat_backward + unet_backward +
-           optimiser;
+    return data + unet_forward + compose + splat_forward + loss + perceptual + splat_backward +
+           unet_backward + optimiser;
   }
 };
 
@@ -74,11 +77,17 @@ struct LearnedParts {
   model::PoseUNet* unet = nullptr;
   StaticMap* statics = nullptr;
   SmallestExtentMap* extents = nullptr;
+  model::LowRankResidual* residual = nullptr;  // folded into the network; of checkpoints alone
 };
 // And what changes it.
 struct PartOptimisers {
-  model::Optimiser* unet = nullptr;
+  model::Optimiser* unet = nullptr;  // of the network or of its residual
   model::Optimiser* statics = nullptr;
+};
+// Of people beyond the first who share the network.
+struct FurtherPerson {
+  StaticMap* statics = nullptr;
+  model::Optimiser* optimiser = nullptr;
 };
 
 void save_weights(const RunDirectory& run, const LearnedParts& parts);
@@ -92,9 +101,11 @@ void load_weights(const std::string& path, model::PoseUNet& unet);
 void load_initial_weights(const std::string& path, const LearnedParts& parts);
 
 void save_checkpoint(const RunDirectory& run, const TrainingState& state, const LearnedParts& parts,
-                     const PartOptimisers& optimisers);
+                     const PartOptimisers& optimisers,
+                     const std::vector<FurtherPerson>& further = {});
 TrainingState load_checkpoint(const RunDirectory& run, const LearnedParts& parts,
-                              const PartOptimisers& optimisers);
+                              const PartOptimisers& optimisers,
+                              const std::vector<FurtherPerson>& further = {});
 
 void save_log(const RunDirectory& run, const std::vector<LogRow>& rows);
 // Rows up to and with `iteration`.

@@ -13,7 +13,8 @@ namespace {
 
 constexpr size_t kAhead = 4;                        // samples prepared before they are asked for
 constexpr size_t kMaxImageBytes = size_t{4} << 30;  // of cached crops
-constexpr uint64_t kBackgroundStream = 0x6267;
+constexpr uint64_t kBackgroundStream = 0x6267, kWindowStream = 0x7764;
+constexpr uint64_t kMaxViews = 64;  // of a sample
 
 std::vector<std::pair<size_t, size_t>> training_pairs(const dataset::Dataset& data) {
   std::vector<std::pair<size_t, size_t>> pairs;
@@ -80,6 +81,29 @@ torch::Tensor target_of(const CroppedImage& image, const model::PixelRect& rect)
   return target;
 }
 
+model::PixelRect window_on_person(const torch::Tensor& target, uint32_t side_px, float unit) {
+  const auto height = static_cast<uint32_t>(target.size(1)),
+             width = static_cast<uint32_t>(target.size(2));
+  if (side_px == 0) return {0, 0, width, height};
+  const float* const mask = target[3].const_data_ptr<float>();
+  const size_t pixels = size_t(width) * height;
+  const auto inside = [](float value) { return value > 0.5f; };
+  const auto count = static_cast<size_t>(std::count_if(mask, mask + pixels, inside));
+  size_t centre = size_t(height / 2) * width + width / 2;
+  if (count > 0) {
+    size_t left = std::min(count - 1, static_cast<size_t>(double(unit) * double(count)));
+    for (centre = 0; !inside(mask[centre]) || left-- > 0;) ++centre;
+  }
+  const auto around = [&](size_t at, uint32_t size) {
+    const uint32_t side = std::min(side_px, size);
+    const size_t first = at > side / 2 ? at - side / 2 : 0;
+    return std::pair{static_cast<uint32_t>(std::min<size_t>(first, size - side)), side};
+  };
+  const auto [x, w] = around(centre % width, width);
+  const auto [y, h] = around(centre / width, height);
+  return {x, y, w, h};
+}
+
 SampleFeed::SampleFeed(const dataset::Dataset& data, const AvatarModel& model,
                        uint64_t first_sample)
     : data_(data),
@@ -141,13 +165,14 @@ std::shared_ptr<const CroppedImage> SampleFeed::image(size_t pair) {
   return crop;
 }
 
-SampleView SampleFeed::prepare_view(uint64_t number, size_t pair) {
+SampleView SampleFeed::prepare_view(uint64_t number, size_t index, size_t pair) {
   const TrainSettings& settings = model_.settings();
   const size_t camera = pairs_[pair].second;
   const std::shared_ptr<const CroppedImage> truth = image(pair);
   SampleView view{.camera = camera,
                   .view = {.camera = data_.cameras()[camera].camera, .crop = truth->rect},
-                  .target = {}};
+                  .target = {},
+                  .window = {}};
   // Gaussians could hide from the loss outside the crop: now and then it looks at the whole image.
   if (settings.whole_image_period > 0 &&
       number % settings.whole_image_period == settings.whole_image_period - 1) {
@@ -156,6 +181,11 @@ SampleView SampleFeed::prepare_view(uint64_t number, size_t pair) {
                       (float(truth->rect.width) * float(truth->rect.height));
   }
   view.target = target_of(*truth, view.view.crop);
+  if (!settings.perceptual.file.empty()) {
+    view.window = window_on_person(
+        view.target, settings.perceptual.window_px,
+        random::random_unit(settings.seed, kWindowStream, kMaxViews * number + index));
+  }
   return view;
 }
 
@@ -178,7 +208,7 @@ Sample SampleFeed::prepare(uint64_t number) {
   const size_t views = std::min<size_t>(settings.views_per_pose, count);
   for (size_t v = 0; v < views; ++v)
     sample.views.push_back(
-        prepare_view(number, first + (pair - first + v * count / views) % count));
+        prepare_view(number, v, first + (pair - first + v * count / views) % count));
   sample.posed = model_.pose(model_.from_capture(data_.frames()[frame]).view());
   switch (settings.background) {
     case TrainingBackground::kBlack:

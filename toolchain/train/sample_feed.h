@@ -26,7 +26,8 @@ namespace figurine::train {
 struct SampleView {
   size_t camera = 0;  // of the data set's list
   model::RenderView view;
-  torch::Tensor target;  // [4,h,w] premultiplied RGB and mask of view.crop
+  torch::Tensor target;     // [4,h,w] premultiplied RGB and mask of view.crop
+  model::PixelRect window;  // of the target, where the perceptual loss looks; empty without one
   float loss_scale =
       1;  // crop area over mask box area: keeps a pixel's weight when the whole image is looked at
 };
@@ -51,6 +52,11 @@ CroppedImage crop_to_mask(const dataset::CaptureImage& image, uint32_t margin_px
 // [4,h,w] float of `rect`, zero where the crop has nothing.
 torch::Tensor target_of(const CroppedImage& image, const model::PixelRect& rect);
 
+// The square of side_px around one of the target's pixels with mask > 0.5, `unit` in [0,1) says
+// which, moved to lie inside the target and as large as that allows. The middle where no pixel has
+// such a mask. side_px = 0: all of the target.
+model::PixelRect window_on_person(const torch::Tensor& target, uint32_t side_px, float unit);
+
 class SampleFeed {
  public:
   // data and model are borrowed. Throws InputError if there is no training image.
@@ -67,7 +73,7 @@ class SampleFeed {
 
  private:
   Sample prepare(uint64_t number);
-  SampleView prepare_view(uint64_t number, size_t pair);
+  SampleView prepare_view(uint64_t number, size_t view, size_t pair);
   std::shared_ptr<const CroppedImage> image(size_t pair);
   void work();
 

@@ -48,6 +48,8 @@ ChannelRange find_channels(const std::string& name, const std::string& where) {
   throw InputError(where + ": static_grids: channels \"" + name + "\" are none of " + known);
 }
 
+constexpr uint32_t kMaxNetworkRank = 256;
+
 void require(bool condition, const std::string& where, const char* what) {
   if (!condition) throw InputError(where + ": " + what);
 }
@@ -169,6 +171,16 @@ void check_parts(const TrainSettings& settings, const std::string& where) {
       taken[c] = true;
     }
   }
+  if (settings.freeze_network) {
+    require(settings.network && !settings.static_grids.empty(), where,
+            "freeze_network: there must be a network, and static_grids to learn");
+    require(!settings.init.empty(), where, "freeze_network: needs the network of an init");
+  }
+  require(settings.network_rank == 0 || settings.freeze_network, where,
+          "network_rank: goes with freeze_network");
+  require(settings.network_rank <= kMaxNetworkRank, where, "network_rank: more than 256");
+  require(settings.perceptual.weight >= 0 && std::isfinite(settings.perceptual.weight), where,
+          "perceptual.weight: must be finite and not negative");
   for (const double value :
        {settings.static_learning_rate, settings.static_penalty, settings.clip_gradient}) {
     require(value >= 0 && std::isfinite(value), where,
@@ -217,6 +229,32 @@ nlohmann::json to_json(const HeadDecoding& decoding) {
   return json;
 }
 
+nlohmann::json loss_to_json(const TrainSettings& s) {
+  nlohmann::json json{{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}};
+  if (s.perceptual.file.empty()) {
+    json["lpips"] = 0.0;
+  } else {
+    json["perceptual"] = {{"network", s.perceptual.name},
+                          {"file", s.perceptual.file},
+                          {"hash", s.perceptual.hash},
+                          {"weight", s.perceptual.weight},
+                          {"window_px", s.perceptual.window_px}};
+  }
+  return json;
+}
+
+void read_loss(const nlohmann::json& json, TrainSettings& s) {
+  s.ssim_weight = json.at("ssim").get<float>();
+  s.mask_weight = json.at("mask").get<float>();
+  const auto found = json.find("perceptual");
+  if (found == json.end()) return;
+  s.perceptual = {.file = found->at("file").get<std::string>(),
+                  .name = found->at("network").get<std::string>(),
+                  .hash = found->at("hash").get<std::string>(),
+                  .weight = found->at("weight").get<float>(),
+                  .window_px = found->at("window_px").get<uint32_t>()};
+}
+
 // What runs before there were static parts did not say, and others need not.
 void add_parts(const TrainSettings& s, nlohmann::json& json) {
   if (s.uv_size > 0) json["uv_size"] = s.uv_size;
@@ -226,6 +264,8 @@ void add_parts(const TrainSettings& s, nlohmann::json& json) {
   if (s.clip_gradient > 0) json["clip_gradient"] = s.clip_gradient;
   if (s.smallest_extent) json["smallest_extent"] = true;
   if (s.antialiased) json["antialiased"] = true;
+  if (s.freeze_network) json["freeze_network"] = true;
+  if (s.network_rank > 0) json["network_rank"] = s.network_rank;
   if (s.static_grids.empty()) return;
   json["static_grids"] = to_string(s.static_grids);
   json["static_colour"] = to_string(s.static_colour);
@@ -243,6 +283,8 @@ void read_parts(const nlohmann::json& json, const std::string& where, TrainSetti
   s.antialiased = json.value("antialiased", false);
   s.channels = json.value("channels", 0u);
   s.clip_gradient = json.value("clip_gradient", 0.0);
+  s.freeze_network = json.value("freeze_network", false);
+  s.network_rank = json.value("network_rank", 0u);
   s.static_grids = parse_static_grids(json.value("static_grids", std::string("none")), where);
   s.static_colour = parse(json.value("static_colour", std::string("gain")), kStaticColours,
                           where + ": static_colour");
@@ -274,7 +316,7 @@ nlohmann::json to_json(const TrainSettings& s) {
       {"threads", s.threads},
       {"views_per_pose", s.views_per_pose},
       {"poses_per_iteration", s.poses_per_iteration},
-      {"loss", {{"l1", 1.0}, {"ssim", s.ssim_weight}, {"mask", s.mask_weight}, {"lpips", 0.0}}},
+      {"loss", loss_to_json(s)},
       {"standoff_weight", s.standoff_weight},
       {"background", to_string(s.background)},
       {"warmup_iterations", s.warmup_iterations},
@@ -319,8 +361,7 @@ TrainSettings settings_from_json(const nlohmann::json& json, const std::string& 
     s.threads = json.at("threads").get<uint32_t>();
     s.views_per_pose = json.value("views_per_pose", 1u);
     s.poses_per_iteration = json.value("poses_per_iteration", 1u);
-    s.ssim_weight = json.at("loss").at("ssim").get<float>();
-    s.mask_weight = json.at("loss").at("mask").get<float>();
+    read_loss(json.at("loss"), s);
     s.standoff_weight = json.value("standoff_weight", 0.0f);
     s.background =
         parse(json.at("background").get<std::string>(), kBackgrounds, where + ": background");

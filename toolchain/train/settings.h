@@ -49,6 +49,15 @@ struct StaticGrid {
   uint32_t step = 1;     // T / G: texels a cell has, a side
 };
 
+// The perceptual term of the loss (toolchain/model/perceptual.h).
+struct PerceptualSettings {
+  std::string file;          // of the network; empty: no such term
+  std::string name, hash;    // of the network, of its file
+  float weight = 0.01f;      // the paper's, for LPIPS
+  uint32_t window_px = 128;  // side of what it looks at, around a random pixel of the person in
+                             // every picture; 0: all that the rest of the loss sees
+};
+
 struct TrainSettings {
   std::string preset = "edge";
   uint32_t uv_size = 0;       // T; 0: the preset's
@@ -64,6 +73,9 @@ struct TrainSettings {
   uint64_t seed = 1;  // of the order of the images; initial weights are the same for all avatars
                       // (kInitialWeightsSeed, or --init)
   std::string init;   // weights or run to start from; empty: the common initial weights
+  bool freeze_network = false;  // of init: only the static values learn
+  uint32_t network_rank = 0;    // above 0 the frozen network's kernels get a residual of this rank,
+                                // which learns (toolchain/model/low_rank.h)
   Schedule schedule{.peak = 2e-3,
                     .ramp_iterations = 50,
                     .floor_fraction = 0.02,
@@ -90,6 +102,7 @@ struct TrainSettings {
       1;  // each on its own share of the threads; their gradients are averaged
   float ssim_weight = 0.1f;
   float mask_weight = 0.1f;
+  PerceptualSettings perceptual;
   float standoff_weight = 4;  // of the pull on Gaussians from mask that the picture leaves
                               // uncovered (standoff.h); 0: none
   TrainingBackground background = TrainingBackground::kGrey;

@@ -17,6 +17,10 @@ TrainedAvatar TrainedAvatar::open(const OpenRunOptions& options) {
   const RunDirectory run{options.run};
   avatar.description_ = read_run(run);
   RunDescription& description = avatar.description_;
+  if (!description.more_data.empty()) {
+    throw InputError(options.run +
+                     ": is a training of several people; open the run of one, a folder in it");
+  }
   if (!options.data.empty()) description.data = options.data;
   if (!options.body.empty()) description.body = options.body;
   avatar.body_ = std::make_unique<PackageFile>(open_package(description.body, PackageKind::kBody));

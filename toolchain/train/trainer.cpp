@@ -1,5 +1,6 @@
 #include "toolchain/train/trainer.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -8,12 +9,16 @@
 #include "toolchain/error.h"
 #include "toolchain/model/allocator.h"
 #include "toolchain/model/loss.h"
+#include "toolchain/model/low_rank.h"
 #include "toolchain/model/optimiser.h"
+#include "toolchain/model/perceptual.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
+#include "toolchain/train/describe_run.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/lanes.h"
 #include "toolchain/train/package_file.h"
+#include "toolchain/train/person.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/train/reference_gaussians.h"
 #include "toolchain/train/sample_feed.h"
@@ -23,7 +28,6 @@ namespace figurine::train {
 
 namespace {
 
-constexpr int kRunFormat = 1;
 constexpr uint64_t kLogPeriod = 50;  // iterations per row
 constexpr double kRunningMean =
     0.02;  // weight of the newest iteration in what the progress bar shows
@@ -69,58 +73,56 @@ struct PoseResult {
   StageSeconds stages;
 };
 
-// Never more lanes than threads: poses beyond them wait for their turn.
-unsigned lane_count(const TrainSettings& settings) {
-  return std::min(settings.poses_per_iteration, settings.threads);
-}
-
 // LibTorch's number of threads inside an operation belongs to the thread that calls it.
 void use_lane_threads(const TrainSettings& settings) {
   at::set_num_threads(static_cast<int>(settings.threads / lane_count(settings)));
 }
 
-std::vector<model::ParameterGroup> network_groups(const AvatarModel& model) {
-  if (!model.has_network()) return {};
-  return model.settings().optimiser == OptimiserKind::kMuon
+// Of what learns of the network: all of it, its residual's factors, or nothing.
+std::vector<model::ParameterGroup> network_groups(const AvatarModel& model,
+                                                  const model::LowRankResidual* residual) {
+  const TrainSettings& settings = model.settings();
+  if (residual != nullptr)
+    return model::adamw_group(static_cast<uint64_t>(residual->factors().numel()));
+  if (!model.has_network() || settings.freeze_network) return {};
+  return settings.optimiser == OptimiserKind::kMuon
              ? model.unet().muon_groups()
              : model::adamw_group(model.unet().parameter_count());
 }
 
-model::OptimiserOptions adamw_options(const TrainSettings& settings, double weight_decay) {
-  return {.beta1 = settings.beta1,
-          .beta2 = settings.beta2,
-          .epsilon = settings.epsilon,
-          .weight_decay = weight_decay};
+std::unique_ptr<model::LowRankResidual> make_residual(const AvatarModel& model) {
+  const TrainSettings& settings = model.settings();
+  if (settings.network_rank == 0) return nullptr;
+  return std::make_unique<model::LowRankResidual>(model.unet(), settings.network_rank,
+                                                  settings.seed);
 }
+
+using People = std::vector<std::unique_ptr<Person>>;
 
 class Trainer {
  public:
-  Trainer(const TrainRequest& request, const TrainSettings& settings, const PackageFile& body,
-          const dataset::Dataset& data, nlohmann::json description)
+  // description: run.json of all together; with one person that person's.
+  Trainer(const TrainRequest& request, const TrainSettings& settings, People people,
+          nlohmann::json description)
       : request_(request),
         settings_(settings),
         run_{request.run},
-        data_(data),
         description_(std::move(description)),
-        model_(body.package.body(), data.shape(), lane_settings(), settings.bf16),
-        optimiser_(network_groups(model_), adamw_options(settings, settings.weight_decay)),
-        static_optimiser_(
-            model::adamw_group(static_cast<uint64_t>(model_.statics().values.numel())),
-            adamw_options(settings, 0)) {
-    for (unsigned lane = 1; lane < lane_count(settings_); ++lane) {
-      replicas_.push_back(std::make_unique<AvatarModel>(body.package.body(), data.shape(),
-                                                        lane_settings(), settings.bf16));
-      replicas_.back()->share_parts(model_);
-    }
+        people_(std::move(people)),
+        residual_(make_residual(model())),
+        optimiser_(network_groups(model(), residual_.get()),
+                   adamw_options(settings, settings.weight_decay)) {
+    for (size_t p = 1; p < people_.size(); ++p) people_[p]->share_network(*people_[0]);
     if (request.fake_quantisation == nullptr) return;
     for (unsigned lane = 0; lane < lane_count(settings_); ++lane)
-      model_of(lane).unet().set_fake_quantisation(request.fake_quantisation);
+      people_[0]->model(lane).unet().set_fake_quantisation(request.fake_quantisation);
   }
 
   TrainResult run() {
     start();
-    SampleFeed feed(data_, model_, state_.iteration * settings_.poses_per_iteration);
-    Progress progress(std::filesystem::path(request_.data).filename().string(), request_.quiet);
+    for (size_t p = 0; p < people_.size(); ++p)
+      people_[p]->start_feed(iterations_of(p) * settings_.poses_per_iteration);
+    Progress progress(title(), request_.quiet);
     const InterruptGuard interrupt;
     double last_checkpoint = now_s();
     const double session_start = state_.seconds;
@@ -135,7 +137,7 @@ class Trainer {
       }
       const double rate = learning_rate(settings_.schedule, state_.iteration, state_.seconds);
       const double before = now_s();
-      const IterationResult result = iterate(feed, rate);
+      const IterationResult result = iterate(rate);
       state_.seconds += now_s() - before;
       ++state_.iteration;
       record(result, rate);
@@ -162,53 +164,105 @@ class Trainer {
   }
 
  private:
-  // A lane's renderer and loss have that lane's share of the threads.
-  TrainSettings lane_settings() const {
-    TrainSettings settings = settings_;
-    settings.threads /= lane_count(settings_);
-    return settings;
+  // Whose network is everybody's.
+  AvatarModel& model() { return people_[0]->model(); }
+
+  bool network_learns() const {
+    return settings_.network && (!settings_.freeze_network || residual_ != nullptr);
+  }
+
+  std::string title() const {
+    return people_.size() == 1 ? std::filesystem::path(request_.data).filename().string()
+                               : std::to_string(people_.size()) + " people";
+  }
+
+  // People take turns. How many iterations person p has had.
+  uint64_t iterations_of(size_t p) const {
+    return (state_.iteration + people_.size() - 1 - p) / people_.size();
+  }
+
+  LearnedParts parts() {
+    LearnedParts parts = model().parts();
+    parts.residual = residual_.get();
+    return parts;
   }
 
   PartOptimisers optimisers() {
-    return {.unet = model_.has_network() ? &optimiser_ : nullptr,
-            .statics = model_.statics().empty() ? nullptr : &static_optimiser_};
+    return {.unet = network_learns() ? &optimiser_ : nullptr,
+            .statics = model().statics().empty() ? nullptr : &people_[0]->static_optimiser};
+  }
+
+  std::vector<FurtherPerson> further() {
+    std::vector<FurtherPerson> further;
+    for (size_t p = 1; p < people_.size(); ++p)
+      further.push_back({&people_[p]->model().statics(), &people_[p]->static_optimiser});
+    return further;
   }
 
   // What a package in fixed point holds of the static values.
   void round_statics() {
     const model::HeadLayout layout = head_layout(settings_);
-    take_static_part(RoundedMap(model_.statics(), layout).view(), layout, model_.statics());
+    take_static_part(RoundedMap(model().statics(), layout).view(), layout, model().statics());
   }
-
-  AvatarModel& model_of(unsigned lane) { return lane == 0 ? model_ : *replicas_[lane - 1]; }
 
   void start() {
     if (request_.resume && std::filesystem::exists(run_.checkpoint())) {
-      state_ = load_checkpoint(run_, model_.parts(), optimisers());
+      state_ = load_checkpoint(run_, parts(), optimisers(), further());
       rows_ = load_log(run_, state_.iteration);
+      measure_smallest_extents(1);  // the checkpoint has the first person's
     } else {
-      if (!settings_.init.empty()) load_initial_weights(settings_.init, model_.parts());
-      if (request_.fake_quantisation != nullptr) round_statics();
-      if (SmallestExtentMap* extents = model_.smallest_extents())
-        round_extents(measure_extents(data_, model_), data_.directory(), *extents);
-      description_["parts"] = describe_parts(model_);
-      write_json(run_.run_json(), description_);
+      begin();
     }
-    if (state_.iteration < settings_.warmup_iterations) reference_ = reference_head(data_, model_);
+    const uint64_t warmup = settings_.warmup_iterations;
+    for (size_t p = 0; p < people_.size(); ++p) {
+      if (iterations_of(p) < warmup)
+        people_[p]->reference = reference_head(people_[p]->data(), people_[p]->model());
+    }
   }
 
-  IterationResult iterate(SampleFeed& feed, double rate) {
+  // Of the people from `first` on.
+  void measure_smallest_extents(size_t first) {
+    for (size_t p = first; p < people_.size(); ++p) {
+      Person& person = *people_[p];
+      if (SmallestExtentMap* extents = person.model().smallest_extents())
+        round_extents(measure_extents(person.data(), person.model()), person.data().directory(),
+                      *extents);
+    }
+  }
+
+  void begin() {
+    if (!settings_.init.empty()) {
+      // The network is everybody's, so it comes again with everybody's static values.
+      for (const auto& person : people_)
+        load_initial_weights(settings_.init, person->model().parts());
+    }
+    if (residual_) residual_->base().copy_(model().unet().weights().detach());
+    if (request_.fake_quantisation != nullptr) round_statics();
+    measure_smallest_extents(0);
+    description_["parts"] = describe_parts(model());
+    if (people_.size() > 1) {
+      for (const auto& person : people_) {
+        make_folder(person->run.path);
+        person->description["parts"] = description_["parts"];
+        write_json(person->run.run_json(), person->description);
+      }
+    }
+    write_json(run_.run_json(), description_);
+  }
+
+  IterationResult iterate(double rate) {
     StageClock clock;
+    Person& person = *people_[state_.iteration % people_.size()];
     const uint32_t count = settings_.poses_per_iteration, lanes = lane_count(settings_);
     std::vector<Sample> samples;
-    for (uint32_t i = 0; i < count; ++i) samples.push_back(feed.next());
+    for (uint32_t i = 0; i < count; ++i) samples.push_back(person.next_sample());
     clock.add(state_.stages.data);
     std::vector<PoseResult> poses(count);
     const double fade =
         standoff_fade(train::progress(settings_.schedule.budget, state_.iteration, state_.seconds));
     lanes_.run([&](unsigned lane) {
       for (uint32_t i = lane; i < count; i += lanes)
-        poses[i] = pose_iteration(samples[i], model_of(lane), fade);
+        poses[i] = pose_iteration(samples[i], person.model(lane), person.reference, fade);
     });
     for (size_t i = 0; i < count; i += lanes) add_stages(poses[i].stages);
     StageClock last;
@@ -216,7 +270,7 @@ class Trainer {
     // In the order of the poses, whatever thread they ran on.
     torch::Tensor gradients = poses[0].gradients, static_gradients = poses[0].static_gradients;
     for (uint32_t i = 0; i < count; ++i) {
-      if (!std::isfinite(poses[i].result.loss)) fail(samples[i], "the loss is not finite");
+      if (!std::isfinite(poses[i].result.loss)) fail(person, samples[i], "the loss is not finite");
       if (i > 0 && gradients.defined()) gradients.add_(poses[i].gradients);
       if (i > 0 && static_gradients.defined()) static_gradients.add_(poses[i].static_gradients);
       result.loss += poses[i].result.loss / count;
@@ -226,23 +280,26 @@ class Trainer {
     for (torch::Tensor* part : {&gradients, &static_gradients}) {
       if (count > 1 && part->defined()) part->mul_(1.0 / count);
     }
-    result.loss += add_penalty(static_gradients);
-    if (!step(gradients, static_gradients, rate)) fail(samples[0], "a gradient is not finite");
+    result.loss += add_penalty(person.model().statics(), static_gradients);
+    if (residual_ && gradients.defined()) gradients = residual_->gradients(gradients);
+    if (!step(person, gradients, static_gradients, rate))
+      fail(person, samples[0], "a gradient is not finite");
     last.add(state_.stages.optimiser);
     return result;
   }
 
   // Of the static values' mean square: returns its share of the loss.
-  double add_penalty(torch::Tensor& static_gradients) const {
+  double add_penalty(const StaticMap& statics, torch::Tensor& static_gradients) const {
     if (settings_.static_penalty == 0 || !static_gradients.defined()) return 0;
-    const torch::Tensor& values = model_.statics().values;
+    const torch::Tensor& values = statics.values;
     const double weight = settings_.static_penalty / static_cast<double>(values.numel());
     static_gradients.add_(values, 2 * weight);
     return weight * values.square().sum().item<double>();
   }
 
   // Both parts or, where a gradient is not finite, none.
-  bool step(torch::Tensor& gradients, torch::Tensor& static_gradients, double rate) {
+  bool step(Person& person, torch::Tensor& gradients, torch::Tensor& static_gradients,
+            double rate) {
     double squared = 0;
     for (const torch::Tensor* part : {&gradients, &static_gradients}) {
       if (part->defined()) squared += model::squared_norm(*part);
@@ -253,11 +310,19 @@ class Trainer {
     for (torch::Tensor* part : {&gradients, &static_gradients}) {
       if (part->defined() && most > 0 && gradient_norm_ > most) part->mul_(most / gradient_norm_);
     }
-    if (gradients.defined() && !optimiser_.step(model_.unet().weights(), gradients, rate))
-      return false;
+    if (gradients.defined() && !step_network(gradients, rate)) return false;
     const double static_rate = rate * settings_.static_learning_rate / settings_.schedule.peak;
     return !static_gradients.defined() || static_rate == 0 ||
-           static_optimiser_.step(model_.statics().values, static_gradients, static_rate);
+           person.static_optimiser.step(person.model().statics().values, static_gradients,
+                                        static_rate);
+  }
+
+  // gradients: of its weights or of its residual's factors.
+  bool step_network(const torch::Tensor& gradients, double rate) {
+    if (residual_ == nullptr) return optimiser_.step(model().unet().weights(), gradients, rate);
+    if (!optimiser_.step(residual_->factors(), gradients, rate)) return false;
+    residual_->fold_into(model().unet().weights());
+    return true;
   }
 
   // Stages of lane 0; the others' run beside them.
@@ -266,23 +331,27 @@ class Trainer {
     sum.unet_forward += stages.unet_forward, sum.unet_backward += stages.unet_backward;
     sum.compose += stages.compose;
     sum.splat_forward += stages.splat_forward, sum.splat_backward += stages.splat_backward;
-    sum.loss += stages.loss;
+    sum.loss += stages.loss, sum.perceptual += stages.perceptual;
   }
 
-  // fade: what is left of the stand-off's weight.
-  PoseResult pose_iteration(const Sample& sample, AvatarModel& model, double fade) const {
+  // reference: of the warm-up. fade: what is left of the stand-off's weight.
+  PoseResult pose_iteration(const Sample& sample, AvatarModel& model,
+                            const torch::Tensor& reference, double fade) const {
     StageClock clock;
     PoseResult pose;
     torch::Tensor output;
-    if (model.has_network()) {
+    if (network_learns()) {
       model.unet().zero_gradients();
+      output = model.unet().forward(sample.posed.input);
+    } else if (model.has_network()) {
+      const torch::NoGradGuard no_gradient;
       output = model.unet().forward(sample.posed.input);
     }
     clock.add(pose.stages.unet_forward);
     const torch::Tensor head = model.compose(output).requires_grad_();
     clock.add(pose.stages.compose);
     if (sample.number / settings_.poses_per_iteration < settings_.warmup_iterations) {
-      const torch::Tensor loss = reference_loss(head, reference_);
+      const torch::Tensor loss = reference_loss(head, reference);
       pose.result.loss = loss.item<double>();
       loss.backward();
       clock.add(pose.stages.loss);
@@ -292,7 +361,7 @@ class Trainer {
     const PartGradients parts = model.compose_backward(output, head.grad());
     pose.static_gradients = parts.statics;
     clock.add(pose.stages.compose);
-    if (model.has_network()) {
+    if (network_learns()) {
       output.backward(parts.network);
       pose.gradients = model.unet().gradients();
     }
@@ -322,6 +391,11 @@ class Trainer {
                                                     .threads = model.settings().threads},
                                                    &terms);
       (loss * (view.loss_scale * share)).backward();
+      clock.add(stages.loss);
+      if (request_.perceptual != nullptr) {
+        result.loss += add_perceptual(sample, view, image_leaf, share);
+        clock.add(stages.perceptual);
+      }
       if (!pulls.empty())
         result.loss += add_pulls(model, view, image_leaf, fade * view.loss_scale * share, pulls);
       clock.add(stages.loss);
@@ -337,6 +411,17 @@ class Trainer {
     return result;
   }
 
+  // Adds the perceptual term's gradient to the picture's; returns its share of the loss. The window
+  // is as large in a whole image: no loss_scale.
+  double add_perceptual(const Sample& sample, const SampleView& view, const torch::Tensor& image,
+                        double share) const {
+    const torch::Tensor distance = model::perceptual_loss(image, view.target, sample.background,
+                                                          view.window, *request_.perceptual);
+    const double weight = share * settings_.perceptual.weight;
+    if (distance.requires_grad()) (distance * weight).backward();
+    return weight * distance.item<double>();
+  }
+
   // Of the picture that was rendered last; its share of the loss.
   double add_pulls(AvatarModel& model, const SampleView& view, const torch::Tensor& image,
                    double scale, std::vector<double>& pulls) const {
@@ -350,11 +435,10 @@ class Trainer {
            standoff_loss(seen, model.renderer().gaussians().position_m, options, scale, pulls);
   }
 
-  [[noreturn]] void fail(const Sample& sample, const char* what) const {
-    throw InputError(run_.path + ": iteration " +
-                     std::to_string(sample.number / settings_.poses_per_iteration) + " (" +
-                     data_.image_path(sample.frame, sample.views.front().camera) + "): " + what +
-                     "; the last checkpoint is kept");
+  [[noreturn]] void fail(const Person& person, const Sample& sample, const char* what) const {
+    throw InputError(run_.path + ": iteration " + std::to_string(state_.iteration) + " (" +
+                     person.data().image_path(sample.frame, sample.views.front().camera) +
+                     "): " + what + "; the last checkpoint is kept");
   }
 
   void record(const IterationResult& result, double rate) {
@@ -378,40 +462,53 @@ class Trainer {
   double shown_psnr() const { return shown_mse_ > 0 ? -10 * std::log10(shown_mse_) : 0; }
 
   void save(const char* status) {
-    save_checkpoint(run_, state_, model_.parts(), optimisers());
-    save_weights(run_, model_.parts());
+    save_checkpoint(run_, state_, parts(), optimisers(), further());
     save_log(run_, rows_);
+    add_progress(description_, status);
+    if (people_.size() == 1) {
+      save_weights(run_, model().parts());
+    } else {
+      for (const auto& person : people_) {
+        save_weights(person->run, person->model().parts());
+        add_progress(person->description, status);
+        write_json(person->run.run_json(), person->description);
+      }
+      StaticMap mean = mean_statics(people_);
+      save_weights(run_, {.unet = &model().unet(), .statics = &mean});
+    }
+    write_json(run_.run_json(), description_);
+  }
+
+  void add_progress(nlohmann::json& description, const char* status) const {
     const double iterations = static_cast<double>(std::max<uint64_t>(1, state_.iteration));
     const StageSeconds& s = state_.stages;
-    description_["status"] = status;
-    description_["iterations"] = state_.iteration;
-    description_["train_seconds"] = state_.seconds;
-    description_["iterations_per_second"] =
+    description["status"] = status;
+    description["iterations"] = state_.iteration;
+    description["train_seconds"] = state_.seconds;
+    description["iterations_per_second"] =
         state_.seconds > 0 ? static_cast<double>(state_.iteration) / state_.seconds : 0.0;
-    description_["breakdown_ms"] = {{"data", 1e3 * s.data / iterations},
-                                    {"unet_forward", 1e3 * s.unet_forward / iterations},
-                                    {"compose", 1e3 * s.compose / iterations},
-                                    {"splat_forward", 1e3 * s.splat_forward / iterations},
-                                    {"loss", 1e3 * s.loss / iterations},
-                                    {"splat_backward", 1e3 * s.splat_backward / iterations},
-                                    {"unet_backward", 1e3 * s.unet_backward / iterations},
-                                    {"optimiser", 1e3 * s.optimiser / iterations}};
-    description_["running"] = {
+    description["breakdown_ms"] = {{"data", 1e3 * s.data / iterations},
+                                   {"unet_forward", 1e3 * s.unet_forward / iterations},
+                                   {"compose", 1e3 * s.compose / iterations},
+                                   {"splat_forward", 1e3 * s.splat_forward / iterations},
+                                   {"loss", 1e3 * s.loss / iterations},
+                                   {"perceptual", 1e3 * s.perceptual / iterations},
+                                   {"splat_backward", 1e3 * s.splat_backward / iterations},
+                                   {"unet_backward", 1e3 * s.unet_backward / iterations},
+                                   {"optimiser", 1e3 * s.optimiser / iterations}};
+    description["running"] = {
         {"loss", shown_loss_}, {"psnr_db", shown_psnr()}, {"gradient_norm", gradient_norm_}};
-    description_["updated"] = utc_now();
-    write_json(run_.run_json(), description_);
+    description["updated"] = utc_now();
   }
 
   const TrainRequest& request_;
   TrainSettings settings_;
   RunDirectory run_;
-  const dataset::Dataset& data_;
   nlohmann::json description_;
-  AvatarModel model_;
-  std::vector<std::unique_ptr<AvatarModel>> replicas_;  // of lanes 1..; their weights are model_'s
+  People people_;
   Lanes lanes_{lane_count(settings_), [settings = settings_] { use_lane_threads(settings); }};
-  model::Optimiser optimiser_, static_optimiser_;
-  torch::Tensor reference_;
+  std::unique_ptr<model::LowRankResidual> residual_;  // null unless settings ask for one
+  model::Optimiser optimiser_;                        // of what learns of the network
   TrainingState state_;
   std::vector<LogRow> rows_;
   Means means_;
@@ -419,42 +516,6 @@ class Trainer {
   double gradient_norm_ = 0;  // of the last step, before clipping
   uint64_t shown_count_ = 0;
 };
-
-nlohmann::json describe(const TrainRequest& request, const TrainSettings& settings,
-                        const PackageFile& body, const dataset::Dataset& data) {
-  uint32_t held_out_cameras = 0;
-  for (const dataset::CaptureCamera& camera : data.cameras()) held_out_cameras += camera.held_out;
-  uint32_t frames[3] = {0, 0, 0};
-  for (const dataset::CaptureFrame& frame : data.frames()) ++frames[static_cast<int>(frame.split)];
-  const Network network = make_network(settings);
-  const uint64_t macs =
-      settings.network
-          ? count_macs(network, value_or_throw(infer_shapes(network, false), settings.preset))
-          : 0;
-  return {{"format", kRunFormat},
-          {"status", "running"},
-          {"tool", "figurine-train " FIGURINE_VERSION},
-          {"command", request.command},
-          {"created", utc_now()},
-          {"commit", current_commit()},
-          {"machine", describe_machine()},
-          {"settings", to_json(settings)},
-          {"macs_per_frame", macs},
-          {"body",
-           {{"path", request.body},
-            {"name", body.package.body().name},
-            {"hash", format_hash(body.package.content_hash())}}},
-          {"shape", data.shape()},
-          {"data",
-           {{"path", request.data},
-            {"seed", data.seed()},
-            {"sources", data.sources()},
-            {"cameras", data.cameras().size() - held_out_cameras},
-            {"held_out_cameras", held_out_cameras},
-            {"training_frames", frames[0]},
-            {"held_out_frames_interleaved", frames[1]},
-            {"held_out_frames_block", frames[2]}}}};
-}
 
 }  // namespace
 
@@ -475,11 +536,73 @@ RunDescription read_run(const RunDirectory& run) {
     description.body_hash = json.at("body").at("hash").get<std::string>();
     description.shape = json.at("shape").get<std::vector<float>>();
     description.settings = settings_from_json(json.at("settings"), path);
+    const nlohmann::json people = json.value("people", nlohmann::json::array());
+    for (size_t p = 1; p < people.size(); ++p)
+      description.more_data.push_back(people[p].at("data").get<std::string>());
   } catch (const nlohmann::json::exception& error) {
     throw InputError(path + ": " + error.what());
   }
   return description;
 }
+
+namespace {
+
+// Everybody's folder, without a slash at its end: its name is the person's.
+std::vector<std::string> everybody(const TrainRequest& request) {
+  std::vector<std::string> folders{request.data};
+  folders.insert(folders.end(), request.more_data.begin(), request.more_data.end());
+  for (std::string& folder : folders) {
+    while (folder.size() > 1 && folder.ends_with('/')) folder.pop_back();
+  }
+  return folders;
+}
+
+// The people's runs inside the training's folder, called as the data folders are. Captures of
+// several seeds have people of one name: the second is NAME_2.
+std::vector<std::string> run_names(const std::vector<std::string>& data) {
+  std::vector<std::string> names;
+  for (const std::string& path : data) {
+    const std::string name = std::filesystem::path(path).filename().string();
+    std::string unique = name;
+    for (int i = 2; std::find(names.begin(), names.end(), unique) != names.end(); ++i)
+      unique = name + "_" + std::to_string(i);
+    names.push_back(unique);
+  }
+  return names;
+}
+
+void check_people(const std::vector<std::string>& data, const TrainSettings& settings) {
+  if (data.size() > 1 && (!settings.network || settings.static_grids.empty()))
+    throw InputError("settings: static_grids: people who share a network need values of their own");
+}
+
+nlohmann::json list_people(const std::vector<std::string>& data) {
+  nlohmann::json people = nlohmann::json::array();
+  const std::vector<std::string> names = run_names(data);
+  for (size_t p = 0; p < data.size(); ++p) people.push_back({{"data", data[p]}, {"run", names[p]}});
+  return people;
+}
+
+// Reads run.json: what the run was begun with must be what it goes on with.
+nlohmann::json take_up(const TrainRequest& request, const std::string& body_hash,
+                       TrainSettings& settings) {
+  RunDescription old = read_run({request.run});
+  if (old.body_hash != body_hash) {
+    throw InputError(request.run + ": was trained on body " + old.body_hash + ", " + request.body +
+                     " is " + body_hash);
+  }
+  if (old.json.contains("one_of"))
+    throw InputError(request.run + ": is one of several people of a training; go on with that");
+  if (old.more_data.size() != request.more_data.size()) {
+    throw InputError(request.run + ": was begun with " + std::to_string(1 + old.more_data.size()) +
+                     " people, not " + std::to_string(1 + request.more_data.size()));
+  }
+  settings = old.settings;
+  settings.threads = request.settings.threads;
+  return std::move(old.json);
+}
+
+}  // namespace
 
 TrainResult train_avatar(const TrainRequest& request) {
   const RunDirectory run{request.run};
@@ -493,14 +616,7 @@ TrainResult train_avatar(const TrainRequest& request) {
   const PackageFile body = open_package(request.body, PackageKind::kBody);
   const std::string body_hash = format_hash(body.package.content_hash());
   if (exists) {
-    RunDescription old = read_run(run);
-    if (old.body_hash != body_hash) {
-      throw InputError(request.run + ": was trained on body " + old.body_hash + ", " +
-                       request.body + " is " + body_hash);
-    }
-    settings = old.settings;
-    settings.threads = request.settings.threads;
-    description = std::move(old.json);
+    description = take_up(request, body_hash, settings);
     if (description.value("status", "") == "finished") {
       return {.state = {.iteration = description.value("iterations", uint64_t{0}),
                         .seconds = description.value("train_seconds", 0.0),
@@ -508,19 +624,43 @@ TrainResult train_avatar(const TrainRequest& request) {
               .was_finished = true};
     }
   }
-  const dataset::Dataset data =
-      dataset::Dataset::open(request.data, {.body = &body.package.body(), .body_hash = body_hash});
+  const std::vector<std::string> paths = everybody(request);
+  check_people(paths, settings);
+  if (settings.perceptual.file.empty() != (request.perceptual == nullptr))
+    throw InputError(request.run + ": perceptual: its network and its settings go together");
+  std::vector<std::unique_ptr<dataset::Dataset>> data;
+  for (const std::string& path : paths) {
+    data.push_back(std::make_unique<dataset::Dataset>(
+        dataset::Dataset::open(path, {.body = &body.package.body(), .body_hash = body_hash})));
+  }
+  const auto describe = [&](size_t person) {
+    return describe_run({.command = request.command,
+                         .body_path = request.body,
+                         .body = &body,
+                         .data = data[person].get()},
+                        settings);
+  };
   if (!exists) {
     check_parts(settings, "settings");
-    description = describe(request, settings, body, data);
+    description = describe(0);
     description.update(request.notes);
-    std::error_code error;
-    std::filesystem::create_directories(request.run, error);
-    if (error) throw InputError(request.run + ": cannot be created: " + error.message());
+    if (paths.size() > 1) description["people"] = list_people(paths);
+    make_folder(request.run);
   }
   use_lane_threads(settings);
   model::keep_freed_memory();
-  return Trainer(request, settings, body, data, std::move(description)).run();
+  People people;
+  for (size_t p = 0; p < paths.size(); ++p) {
+    RunDirectory own = run;
+    nlohmann::json said;
+    if (paths.size() > 1) {
+      own.path += "/" + run_names(paths)[p];
+      said = exists ? read_json(own.run_json()) : describe(p);
+      said["one_of"] = paths.size();
+    }
+    people.push_back(std::make_unique<Person>(body.package.body(), *data[p], settings, own, said));
+  }
+  return Trainer(request, settings, std::move(people), std::move(description)).run();
 }
 
 }  // namespace figurine::train

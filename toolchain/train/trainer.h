@@ -2,9 +2,9 @@
 //
 // Every iteration draws one image of one training pose: pose maps -> UNet -> Gaussians -> picture
 // -> L1 + 0.1 SSIM + 0.1 mask -> optimiser. The picture is cropped to the true mask with a margin;
-// every 16th iteration looks at the whole image, so that nothing can hide outside. LPIPS (0.01 in
-// the paper) is left out: no pretrained AlexNet comes with the platform. Saves a checkpoint every
-// half minute and when interrupted.
+// every 16th iteration looks at the whole image, so that nothing can hide outside. The paper's
+// perceptual term (0.01) is there where a network for it is given. Saves a checkpoint every half
+// minute and when interrupted.
 //
 // Based on: the paper, section 4.1 and implementation details; Pang et al., ASH: Animatable
 // Gaussian Splats for Efficient and Photoreal Human Rendering, 2024 (the warm-up).
@@ -13,20 +13,25 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/settings.h"
 
 namespace figurine::model {
 struct FakeQuantisation;
-}
+class PictureDistance;
+}  // namespace figurine::model
 
 namespace figurine::train {
 
 struct TrainRequest {
-  std::string data;  // one identity's folder
-  std::string body;  // package
-  std::string run;   // folder to write
+  std::string data;                    // one identity's folder
+  std::vector<std::string> more_data;  // of further people, who share the network with the first
+                                       // and take turns; each has static values of its own, and a
+                                       // run for evaluation and packing in RUN/NAME OF THE FOLDER
+  std::string body;                    // package
+  std::string run;                     // folder to write
   TrainSettings settings;
   std::string command;  // as typed, for run.json
   bool resume = false;  // goes on from the run's checkpoint, by the run's own settings; only
@@ -37,6 +42,8 @@ struct TrainRequest {
   std::shared_ptr<const model::FakeQuantisation>
       fake_quantisation;  // of the UNet while training; needs settings.bf16 off. Static values are
                           // then rounded as in a package before the first iteration. Null: none
+  std::shared_ptr<const model::PictureDistance>
+      perceptual;  // the network that settings.perceptual names; null exactly if it names none
   nlohmann::json notes = nlohmann::json::object();  // further entries of a new run's run.json
 };
 
@@ -53,7 +60,8 @@ TrainResult train_avatar(const TrainRequest& request);
 
 // run.json as it describes the person and the body, for evaluation and packing.
 struct RunDescription {
-  std::string data, body;  // paths
+  std::string data, body;              // paths
+  std::vector<std::string> more_data;  // of further people
   std::string body_hash;
   std::vector<float> shape;
   TrainSettings settings;

@@ -56,6 +56,41 @@ TEST(AvatarCommand, ItSaysWhereThreadsAreOthersThanBefore) {
       << resumed.out;
 }
 
+TEST(AvatarCommand, APerceptualNetworkIsNamedInTheRunWhichGoesOnWithNoOther) {
+  const TestFolder folder;
+  const std::string shipped = FIGURINE_SOURCE_DIR "/samples/populations/edge_features.safetensors";
+  std::filesystem::copy(shipped, folder.path("f.safetensors"));
+  const std::string inputs = "--data " + small_capture().data + " --body " + small_capture().body +
+                             " --preset nano --iterations 2 --threads 1 --quiet ";
+  const ProgramRun run =
+      train(folder, inputs + "--sh-degree 1 --perceptual f.safetensors --perceptual-weight 0.5");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string path = folder.path("run/run.json");
+  nlohmann::json json;
+  std::ifstream(path) >> json;
+  EXPECT_EQ(json.at("settings").at("decoding").at("sh_degree"), 1);
+  const nlohmann::json& said = json.at("settings").at("loss").at("perceptual");
+  EXPECT_EQ(said.at("network"), "figurine-features");
+  EXPECT_EQ(said.at("weight"), 0.5);
+  EXPECT_EQ(said.at("window_px"), 128);
+  EXPECT_EQ(said.at("hash").get<std::string>().size(), 32u);
+  json["status"] = "interrupted";
+  std::ofstream(path) << json;
+  EXPECT_EQ(train(folder, "--resume --perceptual f.safetensors --quiet").exit_code, 0);
+  std::ofstream(path) << json;
+  std::ofstream(folder.path("f.safetensors"), std::ios::app) << "x";
+  const ProgramRun other = train(folder, "--resume --quiet");
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_NE(other.err.find("f.safetensors: "), std::string::npos) << other.err;
+  std::ofstream(folder.path("bad.npz")) << "no zip";
+  std::filesystem::remove_all(folder.path("run"));
+  const ProgramRun bad = train(folder, inputs + "--perceptual bad.npz");
+  EXPECT_EQ(bad.exit_code, 1);
+  EXPECT_EQ(std::count(bad.err.begin(), bad.err.end(), '\n'), 1) << bad.err;
+  EXPECT_FALSE(folder.has("run"));
+  EXPECT_EQ(train(folder, inputs + "--perceptual-weight 1").exit_code, 2);
+}
+
 TEST(ThreadsOption, AboveTheUsableCpusIsLoweredWithALineUnlessForced) {
   const TestFolder folder;
   write_stopped_run(folder);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
 
@@ -13,6 +14,7 @@
 #include "rectangles.h"
 #include "toolchain/features/figurine_features.h"
 #include "toolchain/features/retrieval.h"
+#include "toolchain/model/perceptual.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/tensor_file.h"
 
@@ -133,6 +135,44 @@ TEST(FigurineFeatures, DistanceGrowsWithBlurAndNoise) {
 
 // By hand: two layers' worth of arithmetic is LPIPS' own test (user_networks_test.cpp); here that
 // the distance is made of the stages.
+TEST(FigurineFeatures, InALossHasTheDistanceOfReportsAndAGradientDownwards) {
+  const test::TemporaryFolder folder;
+  make_network().save(folder / "features.safetensors");
+  const LossNetwork network = open_loss_network(folder / "features.safetensors");
+  EXPECT_EQ(network.name, "figurine-features");
+  const RgbPictures pictures = rectangles(128, 128, 2, 4);
+  const torch::Tensor truth = to_tensor(pictures[1])[0].clone(),
+                      seen = to_tensor(pictures[0])[0].clone().requires_grad_();
+  const torch::Tensor distance = network.distance->between(seen, truth);
+  const double expected = make_network().distance(pictures[0], pictures[1]);
+  EXPECT_NEAR(distance.item<double>(), expected, 1e-5 * expected);
+  distance.backward();
+  const torch::NoGradGuard no_gradient;
+  const double squared = seen.grad().square().sum().item<double>();
+  ASSERT_GT(squared, 0);
+  // Against the gradient the distance falls as it says, to first order.
+  const double step = 1e-3 * expected / squared;
+  const double fall =
+      expected - network.distance->between(seen - step * seen.grad(), truth).item<double>();
+  std::printf("  falls by %.4f of what the gradient says\n", fall / (step * squared));
+  EXPECT_NEAR(fall, step * squared, 0.1 * step * squared);
+  // Pictures of a loss need not be square.
+  EXPECT_GT(network.distance->between(seen.narrow(1, 0, 50), truth.narrow(1, 0, 50)).item<double>(),
+            0);
+}
+
+TEST(LossNetworks, AreRefusedByNameWhateverTheFileClaimsToBe) {
+  const test::TemporaryFolder folder;
+  for (const char* name : {"text.safetensors", "text.npz", "text.pt"}) {
+    const std::string path = folder / name;
+    std::ofstream(path) << "no network";
+    const std::string message = input_error([&] { open_loss_network(path); });
+    EXPECT_TRUE(message.starts_with(path + ": ") && test::is_one_line(message)) << message;
+  }
+  const std::string missing = input_error([&] { open_loss_network(folder / "none.safetensors"); });
+  EXPECT_NE(missing.find("none.safetensors"), std::string::npos) << missing;
+}
+
 TEST(FigurineFeatures, DistanceIsThatOfTheStages) {
   const FigurineFeatures network = make_network();
   const RgbPictures pictures = rectangles(128, 128, 2, 4);

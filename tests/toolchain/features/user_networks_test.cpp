@@ -13,6 +13,7 @@
 #include "people.h"
 #include "rectangles.h"
 #include "toolchain/body/test_files.h"
+#include "toolchain/model/perceptual.h"
 #include "toolchain/tensor_operations.h"
 
 namespace figurine::features::user_networks_test {
@@ -225,6 +226,77 @@ TEST(Lpips, IsTheSameFromAScript) {
                 .perceptual[0]
                 ->distance(pictures[0], pictures[1]),
             npz);
+}
+
+torch::Tensor tensor_of(const RgbView& picture) {
+  return torch::tensor(std::vector<float>(picture.values.begin(), picture.values.end()))
+      .view({3, picture.height_px, picture.width_px});
+}
+
+TEST(Lpips, InALossHasTheValueAndTheGradientOfItsDefinition) {
+  const test::TemporaryFolder folder;
+  write_npz(folder / "alex.npz", random_arrays());
+  const LossNetwork network = open_loss_network(folder / "alex.npz");
+  EXPECT_EQ(network.name, "LPIPS (AlexNet, alex.npz)");
+  EXPECT_EQ(network.hash, hash_of_file(folder / "alex.npz"));
+  EXPECT_EQ(network.distance->least_side_px(), 31u);
+  // With noise: where a picture is flat, a pool's values are equal, and the distance has a kink.
+  RgbPictures pictures = rectangles(43, 39, 2, 1);
+  tests::Random random(4);
+  for (float& value : pictures.values) value += random.uniform(-0.1f, 0.1f);
+  const torch::Tensor seen = tensor_of(pictures[0]).requires_grad_(),
+                      truth = tensor_of(pictures[1]);
+  const torch::Tensor distance = network.distance->between(seen, truth);
+  const double expected = lpips_of(random_arrays(), pictures[0], pictures[1]);
+  std::printf("  relative error of the value %.1e\n", distance.item<double>() / expected - 1);
+  EXPECT_NEAR(distance.item<double>(), expected, 1e-5 * expected);
+  distance.backward();
+  const float* const gradient = seen.grad().const_data_ptr<float>();
+  const double scale = seen.grad().square().mean().sqrt().item<double>();
+  double worst = 0;
+  int checked = 0, kinks = 0;
+  for (size_t i = 100; i < 3u * 43 * 39; i += 487) {
+    const float kept = pictures.values[i];
+    const auto difference = [&](float h) {
+      pictures.values[i] = kept + h;
+      const double above = pictures.values[i],
+                   up = lpips_of(random_arrays(), pictures[0], pictures[1]);
+      pictures.values[i] = kept - h;
+      const double below = pictures.values[i],
+                   down = lpips_of(random_arrays(), pictures[0], pictures[1]);
+      pictures.values[i] = kept;
+      return (up - down) / (above - below);
+    };
+    // A kink of a ReLU or of the pooling inside a step shows as two steps that disagree.
+    const double coarse = difference(1e-3f), fine = difference(2.5e-4f);
+    if (std::abs(coarse - fine) > 1e-2 * (std::abs(fine) + scale)) {
+      ++kinks;
+      continue;
+    }
+    ++checked;
+    worst = std::max(worst, std::abs(double(gradient[i]) - fine) / (std::abs(fine) + scale));
+  }
+  std::printf("  %d values, %d more on a kink, largest relative error %.1e\n", checked, kinks,
+              worst);
+  EXPECT_GE(checked, 5);
+  EXPECT_LT(worst, 2e-2);  // as large as what kinks too small to be told add to a difference
+}
+
+TEST(Lpips, InALossPassesNothingOnWherePicturesAreEqual) {
+  const test::TemporaryFolder folder;
+  Arrays arrays = random_arrays();
+  for (double& bias : arrays.values["net.slice5.10.bias"]) bias = -1e3;  // a layer that is dead
+  write_npz(folder / "alex.npz", arrays);
+  const LpipsAlex network = LpipsAlex::load(folder / "alex.npz");
+  const RgbPictures pictures = rectangles(40, 40, 2, 3);
+  const auto gradient = [&](size_t other) {
+    const torch::Tensor seen = tensor_of(pictures[0]).requires_grad_();
+    network.between(seen, tensor_of(pictures[other])).backward();
+    return seen.grad();
+  };
+  EXPECT_EQ(gradient(0).abs().max().item<float>(), 0);
+  EXPECT_TRUE(gradient(1).isfinite().all().item<bool>());
+  EXPECT_GT(gradient(1).abs().max().item<float>(), 0);
 }
 
 TEST(Lpips, SaysWhatAFileLacks) {

@@ -10,8 +10,10 @@
 #include "tests/toolchain/model/synthetic_body.h"
 #include "toolchain/error.h"
 #include "toolchain/model/loss.h"
+#include "toolchain/model/low_rank.h"
 #include "toolchain/model/muon.h"
 #include "toolchain/model/optimiser.h"
+#include "toolchain/model/perceptual.h"
 #include "toolchain/model/render.h"
 #include "toolchain/model/ssim.h"
 #include "toolchain/model/unet.h"
@@ -529,6 +531,152 @@ TEST(ImageLoss, ValueAndGradientEqualTorchsOwnOperations) {
   const torch::Tensor inside = (y[3] > 0.5).to(torch::kDouble);
   EXPECT_EQ(terms.foreground, inside.sum().item<int64_t>());
   EXPECT_NEAR(terms.squared_error, ((a - b).pow(2) * inside).sum().item<double>(), 1e-2);
+}
+
+// (sum of w (seen - truth))^2 with w = 1, 2, 3, ...: every value has a gradient of its own.
+class WeightedSum : public PictureDistance {
+ public:
+  uint32_t least_side_px() const override { return 5; }
+  torch::Tensor between(const torch::Tensor& seen, const torch::Tensor& truth) const override {
+    return (weights(seen) * (seen - truth)).sum().square();
+  }
+  static torch::Tensor weights(const torch::Tensor& like) {
+    return (1 + torch::arange(like.numel(), torch::kFloat)).view(like.sizes()) * 1e-3f;
+  }
+};
+
+TEST(PerceptualLoss, LooksAtItsWindowThroughTheBackground) {
+  torch::Tensor image = torch::rand({4, 20, 30}).requires_grad_();
+  const torch::Tensor target = torch::rand({4, 20, 30});
+  const std::array<float, 3> background{0.5f, 0.2f, 0.9f};
+  const PixelRect window{.x = 7, .y = 4, .width = 6, .height = 9};
+  const torch::Tensor loss = perceptual_loss(image, target, background, window, WeightedSum());
+  loss.backward();
+  double sum = 0;
+  const auto over = [&](const torch::Tensor& picture, int64_t c, int64_t y, int64_t x) {
+    return picture[c][y][x].item<double>() +
+           (1 - picture[3][y][x].item<double>()) * double(background[size_t(c)]);
+  };
+  for (int64_t c = 0; c < 3; ++c) {
+    for (int64_t y = 0; y < 9; ++y) {
+      for (int64_t x = 0; x < 6; ++x)
+        sum += 1e-3 * double(1 + (c * 9 + y) * 6 + x) *
+               (over(image, c, 4 + y, 7 + x) - over(target, c, 4 + y, 7 + x));
+    }
+  }
+  EXPECT_NEAR(loss.item<double>(), sum * sum, 1e-4 * sum * sum);
+  const torch::Tensor gradient = image.grad();
+  using Corner = std::array<int64_t, 2>;
+  for (const auto [y, x] : {Corner{0, 0}, Corner{8, 5}}) {
+    double by_alpha = 0;
+    for (int64_t c = 0; c < 3; ++c) {
+      const double expected = 2 * sum * 1e-3 * double(1 + (c * 9 + y) * 6 + x);
+      EXPECT_NEAR(gradient[c][4 + y][7 + x].item<double>(), expected, 1e-4 * std::abs(expected));
+      by_alpha -= expected * double(background[size_t(c)]);
+    }
+    EXPECT_NEAR(gradient[3][4 + y][7 + x].item<double>(), by_alpha, 1e-4 * std::abs(by_alpha));
+  }
+  torch::Tensor outside = gradient.detach().clone();
+  outside.narrow(1, 4, 9).narrow(2, 7, 6).zero_();
+  EXPECT_EQ(outside.abs().max().item<float>(), 0);
+  const torch::Tensor small = perceptual_loss(
+      image, target, background, {.x = 0, .y = 0, .width = 9, .height = 4}, WeightedSum());
+  EXPECT_EQ(small.item<float>(), 0);
+  EXPECT_FALSE(small.requires_grad());
+}
+
+TEST(LowRankResidual, StartsAtItsNetworkAndFoldsIntoTheKernels) {
+  PoseUNet unet(make_pose_unet(16, 6, 8, head_channels(0)), {.seed = 5});
+  const torch::Tensor before = unet.weights().detach().clone();
+  LowRankResidual residual(unet, 3, 7), again(unet, 3, 7), other(unet, 3, 8);
+  EXPECT_TRUE(torch::equal(residual.factors(), again.factors()));
+  EXPECT_FALSE(torch::equal(residual.factors(), other.factors()));
+  residual.fold_into(unet.weights());
+  EXPECT_TRUE(torch::equal(unet.weights(), before)) << "B is zero";
+  residual.factors().add_(random_tensor({residual.factors().numel()}, 3));
+  residual.fold_into(unet.weights());
+  const std::vector<double> base = to_double(before), factors = to_double(residual.factors()),
+                            folded = to_double(unet.weights());
+  std::vector<double> expected = base;
+  size_t at = 0;
+  for (const KernelMatrix& kernel : unet.kernels()) {
+    const auto rows = static_cast<size_t>(kernel.rows),
+               columns = static_cast<size_t>(kernel.columns),
+               begin = static_cast<size_t>(kernel.begin);
+    const double *a = &factors[at], *b = a + rows * 3;
+    at += (rows + columns) * 3;
+    for (size_t i = 0; i < rows; ++i) {
+      for (size_t k = 0; k < columns; ++k) {
+        for (size_t r = 0; r < 3; ++r)
+          expected[begin + i * columns + k] += a[i * 3 + r] * b[r * columns + k];
+      }
+    }
+  }
+  ASSERT_EQ(at, factors.size());
+  double largest = 0;
+  for (size_t i = 0; i < base.size(); ++i)
+    largest = std::max(largest, std::abs(expected[i] - folded[i]));
+  std::printf("largest error of a folded weight %.3g\n", largest);
+  EXPECT_LT(largest, 1e-5);
+  residual.fold_into(unet.weights());
+  EXPECT_EQ(to_double(unet.weights()), folded) << "folding again adds nothing";
+}
+
+TEST(LowRankResidual, IsNoWiderThanAKernel) {
+  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)), {});
+  LowRankResidual residual(unet, 100, 1);
+  int64_t count = 0;
+  for (const KernelMatrix& kernel : unet.kernels())
+    count += (kernel.rows + kernel.columns) * std::min(kernel.rows, kernel.columns);
+  EXPECT_EQ(residual.factors().numel(), count);
+}
+
+TEST(LowRankResidual, GradientsEqualFiniteDifferencesOfTheFoldedNetwork) {
+  PoseUNet unet(make_pose_unet(16, 6, 4, head_channels(0)),
+                {.precision = Precision::kFloat32, .seed = 5, .head_weight_factor = 1});
+  const torch::Tensor input = random_tensor({16, 16, 6}, 6),
+                      weights = random_tensor({16, 16, 14}, 7);
+  LowRankResidual residual(unet, 2, 3);
+  residual.factors().add_(random_tensor({residual.factors().numel()}, 8), 0.1);
+  residual.fold_into(unet.weights());
+  unet.forward(input).backward(weights);
+  const std::vector<double> gradient = to_double(residual.gradients(unet.gradients())),
+                            by_output = to_double(weights), wide_input = to_double(input);
+  float* const factors = residual.factors().mutable_data_ptr<float>();
+  const auto loss = [&] {
+    std::vector<float> storage;
+    residual.fold_into(unet.weights());
+    const std::vector<double> out = evaluate(unet.export_network(storage), wide_input);
+    double sum = 0;
+    for (size_t i = 0; i < out.size(); ++i) sum += by_output[i] * out[i];
+    return sum;
+  };
+  double scale = 0, largest = 0;
+  for (const double value : gradient) scale += value * value / static_cast<double>(gradient.size());
+  scale = std::sqrt(scale);
+  int kinks = 0, checked = 0;
+  for (size_t i = 0; i < gradient.size(); i += 11, ++checked) {
+    const float kept = factors[i];
+    const auto difference = [&](float h) {
+      factors[i] = kept + h;
+      const double up = loss(), above = factors[i];
+      factors[i] = kept - h;
+      const double down = loss(), below = factors[i];
+      factors[i] = kept;
+      return (up - down) / (above - below);
+    };
+    // As above; folded weights are floats, whose rounding wants steps that are not too small.
+    const double coarse = difference(2e-3f), fine = difference(5e-4f);
+    if (std::abs(coarse - fine) > 1e-2 * (std::abs(fine) + scale)) {
+      ++kinks;
+      continue;
+    }
+    largest = std::max(largest, std::abs(gradient[i] - fine) / (std::abs(fine) + scale));
+  }
+  std::printf("%d of %d values on a kink, largest relative error of the others %.3g\n", kinks,
+              checked, largest);
+  EXPECT_LT(largest, 2e-2);
+  EXPECT_LT(kinks, checked / 2);
 }
 
 struct TinyScene {

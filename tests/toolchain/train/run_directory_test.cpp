@@ -162,15 +162,24 @@ TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritte
   const nlohmann::json plain = to_json(settings);
   for (const char* key :
        {"network", "network_size", "channels", "uv_size", "static_grids", "static_colour",
-        "static_learning_rate", "clip_gradient", "smallest_extent", "antialiased"}) {
+        "static_learning_rate", "clip_gradient", "smallest_extent", "antialiased",
+        "freeze_network", "network_rank"}) {
     EXPECT_FALSE(plain.contains(key)) << key;
   }
+  EXPECT_EQ(plain.at("loss").dump(),
+            R"({"l1":1.0,"lpips":0.0,"mask":)" + nlohmann::json(settings.mask_weight).dump() +
+                R"(,"ssim":)" + nlohmann::json(settings.ssim_weight).dump() + "}");
   EXPECT_EQ(network_side(settings), 128u);
   settings.uv_size = 256;
   settings.network_size = 64;
   settings.channels = 16;
   settings.clip_gradient = 0.5;
   settings.smallest_extent = settings.antialiased = true;
+  settings.init = "other";
+  settings.freeze_network = true;
+  settings.network_rank = 4;
+  settings.perceptual = {
+      .file = "f.npz", .name = "LPIPS", .hash = "12", .weight = 0.5f, .window_px = 0};
   settings.static_colour = model::StaticColour::kSum;
   settings.static_learning_rate = 5e-3;
   settings.static_grids = parse_static_grids("colour:T,rest:T/2", "test");

@@ -9,8 +9,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tests/toolchain/train/small_capture.h"
+#include "tests/toolchain/train/requests.h"
 #include "toolchain/error.h"
+#include "toolchain/model/perceptual.h"
 #include "toolchain/pictures/contact_sheet.h"
 #include "toolchain/reconstruction/idle_channels.h"
 #include "toolchain/reconstruction/reconstruction.h"
@@ -27,33 +28,12 @@ namespace figurine::train::training_test {
 namespace {
 
 namespace fs = std::filesystem;
+using testing_tools::both_parts;
+using testing_tools::bytes_of;
+using testing_tools::error_of;
+using testing_tools::request;
 using testing_tools::small_capture;
 using testing_tools::TemporaryFolder;
-
-TrainRequest request(const std::string& run, uint64_t iterations) {
-  TrainRequest request{.data = small_capture().data,
-                       .body = small_capture().body,
-                       .run = run,
-                       .settings = preset_settings("nano"),
-                       .quiet = true};
-  request.settings.schedule.budget = {.iterations = iterations, .seconds = 0};
-  request.settings.threads = 1;
-  return request;
-}
-
-std::string bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-std::string error_of(const TrainRequest& request) {
-  try {
-    train_avatar(request);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 constexpr uint64_t kIterations = 200;
 
@@ -297,14 +277,6 @@ TEST(Lanes, PassOnWhatTheLowestLaneThrewAndGoOn) {
   EXPECT_EQ(calls, (std::array<int, 3>{2, 2, 2}));
 }
 
-// All static values at T beside a network at half the side.
-TrainRequest both_parts(const std::string& run, uint64_t iterations) {
-  TrainRequest both = request(run, iterations);
-  both.settings.network_size = 16;
-  both.settings.static_grids = parse_static_grids("all:T", "test");
-  return both;
-}
-
 TEST(Training, OfAStaticPartAndACoarseNetworkBeatsTheNetworkAlone) {
   const TemporaryFolder folder;
   train_avatar(both_parts(folder.path("run"), kIterations));
@@ -382,6 +354,77 @@ TEST(Training, OfBothPartsGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
   const TensorFile still =
       without("still", [](TrainSettings& settings) { settings.static_learning_rate = 0; });
   for (const float value : still.tensors.at("static.1").values) ASSERT_EQ(value, 0);
+}
+
+// Differences of means over 4x4 pixels.
+class CoarseDifference : public model::PictureDistance {
+ public:
+  uint32_t least_side_px() const override { return 4; }
+  torch::Tensor between(const torch::Tensor& seen, const torch::Tensor& truth) const override {
+    return torch::avg_pool2d((seen - truth).unsqueeze(0), 4).square().mean();
+  }
+};
+
+TEST(Training, WithAPerceptualLossGivesTheSameBitsResumedAndOnAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  TrainRequest straight = request(folder.path("straight"), 10);
+  straight.settings.poses_per_iteration = 2;
+  straight.settings.views_per_pose = 2;
+  straight.settings.perceptual = {
+      .file = "coarse", .name = "coarse", .hash = "1", .weight = 1, .window_px = 24};
+  straight.perceptual = std::make_shared<const CoarseDifference>();
+  train_avatar(straight);
+  const nlohmann::json said = read_run({straight.run}).json;
+  EXPECT_EQ(said.at("settings").at("loss").at("perceptual").at("network"), "coarse");
+  EXPECT_GT(said.at("breakdown_ms").at("perceptual"), 0);
+  TrainRequest broken = straight;
+  broken.run = folder.path("broken");
+  broken.settings.threads = 2;
+  broken.stop_after = 4;
+  EXPECT_THROW(train_avatar(broken), Interrupted);
+  broken.stop_after = 0;
+  broken.resume = true;
+  train_avatar(broken);
+  const std::string weights = bytes_of(RunDirectory{straight.run}.weights());
+  EXPECT_TRUE(weights == bytes_of(RunDirectory{broken.run}.weights()));
+  const auto with = [&](const char* name, auto change) {
+    TrainRequest other = straight;
+    other.run = folder.path(name);
+    change(other);
+    train_avatar(other);
+    return bytes_of(RunDirectory{other.run}.weights());
+  };
+  const auto without = [](TrainRequest& other) {
+    other.settings.perceptual = {};
+    other.perceptual = nullptr;
+  };
+  const auto of_no_weight = [](TrainRequest& other) { other.settings.perceptual.weight = 0; };
+  const std::string none = with("none", without);
+  EXPECT_FALSE(weights == none);
+  EXPECT_TRUE(none == with("zero", of_no_weight));
+  EXPECT_FALSE(weights ==
+               with("all", [](TrainRequest& r) { r.settings.perceptual.window_px = 0; }));
+  TrainRequest bad = straight;
+  bad.run = folder.path("bad");
+  bad.perceptual = nullptr;
+  EXPECT_NE(error_of(bad).find("perceptual"), std::string::npos) << error_of(bad);
+}
+
+TEST(SampleFeed, WindowLiesInsideAroundAPixelOfThePerson) {
+  torch::Tensor target = torch::zeros({4, 20, 30});
+  target[3][2][28] = 1;
+  target[3][15][10] = 1;
+  target[3][18][3] = 0.4f;
+  const auto is = [](const model::PixelRect& rect, uint32_t x, uint32_t y, uint32_t w, uint32_t h) {
+    return rect.x == x && rect.y == y && rect.width == w && rect.height == h;
+  };
+  EXPECT_TRUE(is(window_on_person(target, 8, 0.0f), 22, 0, 8, 8));  // of the first pixel, moved
+  EXPECT_TRUE(is(window_on_person(target, 8, 0.49f), 22, 0, 8, 8));
+  EXPECT_TRUE(is(window_on_person(target, 8, 0.5f), 6, 11, 8, 8));
+  EXPECT_TRUE(is(window_on_person(target, 8, 0.99999994f), 6, 11, 8, 8));
+  EXPECT_TRUE(is(window_on_person(target, 24, 0.9f), 0, 0, 24, 20)) << "as large as there is";
+  EXPECT_TRUE(is(window_on_person(target, 0, 0.9f), 0, 0, 30, 20));
+  EXPECT_TRUE(is(window_on_person(torch::zeros({4, 20, 30}), 8, 0.9f), 11, 6, 8, 8));
 }
 
 TEST(Training, FromAnotherRunTakesItsStaticPartOrTheNetworkAlone) {
