@@ -160,10 +160,9 @@ TEST_F(RunDirectoryTest, AnOldRunOfEdgeIsWhatItWas) {
 TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritten) {
   TrainSettings settings = network_alone(preset_settings("edge"));
   const nlohmann::json plain = to_json(settings);
-  for (const char* key :
-       {"network", "network_size", "channels", "uv_size", "static_grids", "static_colour",
-        "static_learning_rate", "clip_gradient", "smallest_extent", "antialiased",
-        "freeze_network", "network_rank"}) {
+  for (const char* key : {"network", "network_size", "channels", "uv_size", "static_grids",
+                          "static_colour", "static_learning_rate", "clip_gradient",
+                          "smallest_extent", "antialiased", "freeze_network", "network_rank"}) {
     EXPECT_FALSE(plain.contains(key)) << key;
   }
   EXPECT_EQ(plain.at("loss").dump(),
