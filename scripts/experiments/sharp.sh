@@ -86,6 +86,10 @@ network_32|body|--network-size 32
 channels_24|body|--channels 24
 channels_16|body|--channels 16
 mesh_layout|body_mesh_layout|
+smallest_extent|body|--smallest-extent on
+antialiased|body|--antialiased on
+filters|body|--smallest-extent on --antialiased on
+sh_degree_1|body|--sh-degree 1
 "
 while IFS='|' read -r name row_body options; do
   [ -n "$name" ] && wanted "$name" || continue
