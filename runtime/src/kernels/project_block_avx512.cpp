@@ -8,6 +8,8 @@ namespace {
 
 #include "runtime/src/kernels/lanes_avx512.inc"
 
+#include "runtime/src/kernels/projection_constants.inc"
+
 #include "runtime/src/kernels/project_lanes.inc"
 
 }  // namespace

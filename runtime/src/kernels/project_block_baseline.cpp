@@ -11,24 +11,7 @@ namespace {
 
 #include "runtime/src/kernels/kernel_math.inc"
 
-// Real spherical harmonics in the sign convention of the original 3DGS (figurine/gaussian.h).
-constexpr float kSh0 = 0.28209479177387814f;
-constexpr float kSh1 = 0.4886025119029199f;
-constexpr float kSh2[5] = {1.0925484305920792f, -1.0925484305920792f, 0.31539156525252005f,
-                           -1.0925484305920792f, 0.5462742152960396f};
-constexpr float kSh3[7] = {-0.5900435899266435f, 2.890611442640554f,   -0.4570457994644658f,
-                           0.3731763325901154f,  -0.4570457994644658f, 1.445305721320277f,
-                           -0.5900435899266435f};
-
-// Slack of the bounds that only save work: the pixel test decides, these may be too large but never
-// too small.
-constexpr float kReachSlack =
-    1e-3f;  // in log2 of alpha, a thousand times the rounding of the blend
-constexpr float kBoxSlackPx = 1e-3f;
-// The blend's smallest power is 2^-126, which an opacity of 2^118 would lift to the cut, however
-// far away: nothing would bound the splat.
-constexpr float kMaxOpacity = 1e30f;
-constexpr float kBoxSlackRatio = 1.0001f;
+#include "runtime/src/kernels/projection_constants.inc"
 
 float dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
