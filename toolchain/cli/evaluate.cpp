@@ -13,6 +13,7 @@
 
 #include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/report_head.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/dataset/picture_file.h"
 #include "toolchain/error.h"
@@ -41,20 +42,6 @@ struct EvaluateArguments {
   std::vector<std::string> beside;          // of the contact sheet
   std::string precision = "f32", sheet, output, package;
 };
-
-nlohmann::json report_head(const EvaluateArguments& arguments, const train::TrainedAvatar& avatar) {
-  nlohmann::json report{{"command", train::current_command()},
-                        {"commit", train::current_commit()},
-                        {"machine", train::describe_machine()},
-                        {"date", train::utc_now()},
-                        {"run", arguments.open.run},
-                        {"identity", avatar.data().directory()},
-                        {"settings", train::to_json(avatar.description().settings)}};
-  for (const char* key : {"iterations", "train_seconds", "iterations_per_second", "breakdown_ms"}) {
-    if (avatar.description().json.contains(key)) report[key] = avatar.description().json.at(key);
-  }
-  return report;
-}
 
 void print_group(const char* title, const nlohmann::json& group) {
   const auto number = [&](const std::string& key) {
@@ -93,7 +80,7 @@ void run_reconstruction(const EvaluateArguments& arguments) {
     beside.push_back(train::TrainedAvatar::open(
         {.run = run, .data = arguments.open.data, .threads = arguments.open.threads}));
   }
-  nlohmann::json report = report_head(arguments, avatar);
+  nlohmann::json report = report_head(arguments.open.run, avatar);
   report.update(reconstruction::evaluate_reconstruction(avatar, arguments.reconstruction));
   if (!arguments.sheet.empty()) {
     pictures::Avatars shown;
@@ -122,7 +109,7 @@ void run_parity(const EvaluateArguments& arguments) {
   const train::AvatarFile device = train::open_avatar(arguments.package);
   const verify::ParityReport parity =
       verify::compare_with_runtime(avatar, device.avatar, arguments.parity);
-  nlohmann::json report = report_head(arguments, avatar);
+  nlohmann::json report = report_head(arguments.open.run, avatar);
   report["package"] = arguments.package;
   report["precision"] = arguments.precision;
   report["package_hash"] = format_hash(device.file.package.content_hash());

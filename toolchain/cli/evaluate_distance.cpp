@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/report_head.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/json_number.h"
 #include "toolchain/reconstruction/distance.h"
@@ -44,16 +45,7 @@ void run_distance(DistanceArguments arguments) {
   }
   if (!arguments.distance.pictures.empty()) train::make_folder(arguments.distance.pictures);
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
-  nlohmann::json report{{"command", train::current_command()},
-                        {"commit", train::current_commit()},
-                        {"machine", train::describe_machine()},
-                        {"date", train::utc_now()},
-                        {"run", arguments.open.run},
-                        {"identity", avatar.data().directory()},
-                        {"settings", train::to_json(avatar.description().settings)}};
-  for (const char* key : {"iterations", "train_seconds"}) {
-    if (avatar.description().json.contains(key)) report[key] = avatar.description().json.at(key);
-  }
+  nlohmann::json report = report_head(arguments.open.run, avatar);
   report.update(reconstruction::evaluate_distance(avatar, arguments.distance));
   if (!arguments.output.empty()) train::write_json(arguments.output, report);
   for (const nlohmann::json& row : report.at("scales")) print_scale(row);
