@@ -13,9 +13,9 @@
 #include "toolchain/cli/train_all.h"
 #include "toolchain/error.h"
 #include "toolchain/features/feature_network.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
-#include "toolchain/train/threads.h"
 #include "toolchain/train/trainer.h"
 
 namespace figurine::cli {
@@ -148,7 +148,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
   }
 }
 
-uint32_t core_count() { return train::default_threads(); }
+uint32_t core_count() { return model::default_threads(); }
 
 // Two one-thread trainings on two cores do more than one of two threads after the other
 // (docs/training.md).
@@ -290,12 +290,12 @@ void add_filter_options(CLI::App* command, AvatarArguments& arguments) {
   command
       ->add_option("--smallest-extent", arguments.smallest_extent,
                    "on: no Gaussian below what the sharpest training view of its texel resolved, "
-                   "for close-ups (default off)")
+                   "for close-ups (default: the preset's)")
       ->check(CLI::IsMember({"on", "off"}));
   command
       ->add_option("--antialiased", arguments.antialiased,
                    "on: what widens a small Gaussian to the pixel grid is taken from its opacity, "
-                   "in training and on devices, for views from afar (default off)")
+                   "in training and on devices, for views from afar (default: the preset's)")
       ->check(CLI::IsMember({"on", "off"}));
 }
 

@@ -18,12 +18,12 @@
 #include "toolchain/dataset/picture_file.h"
 #include "toolchain/error.h"
 #include "toolchain/json_number.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/pictures/contact_sheet.h"
 #include "toolchain/reconstruction/quantization.h"
 #include "toolchain/reconstruction/reconstruction.h"
 #include "toolchain/reconstruction/requantization.h"
 #include "toolchain/train/avatar_file.h"
-#include "toolchain/train/threads.h"
 #include "toolchain/verify/parity.h"
 
 namespace figurine::cli {
@@ -225,7 +225,7 @@ void add_evaluate_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("evaluate", "Measure trained avatars");
   command->require_subcommand(1);
   auto arguments = std::make_shared<EvaluateArguments>();
-  arguments->open.threads = train::default_threads();
+  arguments->open.threads = model::default_threads();
 
   CLI::App* reconstruction =
       command->add_subcommand("reconstruction", "Held-out cameras and poses against the truth");

@@ -10,9 +10,9 @@
 #include "toolchain/cli/report_head.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/json_number.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/reconstruction/distance.h"
 #include "toolchain/train/run_directory.h"
-#include "toolchain/train/threads.h"
 
 namespace figurine::cli {
 
@@ -57,7 +57,7 @@ void run_distance(DistanceArguments arguments) {
 
 void add_evaluate_distance_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<DistanceArguments>();
-  arguments->open.threads = train::default_threads();
+  arguments->open.threads = model::default_threads();
   CLI::App* command = evaluate.add_subcommand(
       "distance", "From nearer and farther than the training cameras, against the person anew");
   command->add_option("--run", arguments->open.run, "Folder of a run")->required();

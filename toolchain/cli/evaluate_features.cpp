@@ -10,9 +10,9 @@
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/features/retrieval.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
-#include "toolchain/train/threads.h"
 
 namespace figurine::cli {
 
@@ -86,7 +86,7 @@ void run(const FeaturesArguments& arguments) {
 
 void add_evaluate_features_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<FeaturesArguments>();
-  arguments->options.threads = train::default_threads();
+  arguments->options.threads = model::default_threads();
   CLI::App* command = evaluate.add_subcommand(
       "features", "How well networks find people again in other poses, against chance and pixels");
   command

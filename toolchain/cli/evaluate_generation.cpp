@@ -22,9 +22,9 @@
 #include "toolchain/generation/generation.h"
 #include "toolchain/json_number.h"
 #include "toolchain/members/member_sheets.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
-#include "toolchain/train/threads.h"
 #include "toolchain/verify/device_samples.h"
 #include "toolchain/verify/float_sampler.h"
 #include "toolchain/verify/posterior_entropy.h"
@@ -263,7 +263,7 @@ class Samplers {
 };
 
 void run_generation(const GenerationArguments& arguments) {
-  train::use_threads(arguments.threads);
+  model::use_threads(arguments.threads);
   generation::GenerationOptions options = arguments.options;
   options.networks = features::open_networks(arguments.networks),
   options.threads = arguments.threads;
@@ -319,7 +319,7 @@ struct SamplingArguments {
 };
 
 void run_sampling(const SamplingArguments& arguments) {
-  train::use_threads(arguments.threads);
+  model::use_threads(arguments.threads);
   const generate::TrainedSampler trained =
       generate::TrainedSampler::open(arguments.run, arguments.population);
   const train::PackageFile sampler = train::open_package(arguments.sampler, PackageKind::kSampler);
@@ -347,7 +347,7 @@ void run_sampling(const SamplingArguments& arguments) {
 
 void add_evaluate_generation_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<GenerationArguments>();
-  arguments->threads = train::default_threads();
+  arguments->threads = model::default_threads();
   CLI::App* command = evaluate.add_subcommand(
       "generation", "Sampled people against held-out and training ones, and rows to be beaten");
   command

@@ -15,9 +15,9 @@
 #include "toolchain/json_number.h"
 #include "toolchain/members/member_sheets.h"
 #include "toolchain/members/members.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/run_directory.h"
-#include "toolchain/train/threads.h"
 
 namespace figurine::cli {
 
@@ -160,7 +160,7 @@ void run_members(const MembersArguments& arguments) {
 
 void add_evaluate_members_command(CLI::App& evaluate) {
   auto arguments = std::make_shared<MembersArguments>();
-  arguments->threads = train::default_threads();
+  arguments->threads = model::default_threads();
   CLI::App* command = evaluate.add_subcommand(
       "members", "What a population is like: quality, distances, spectrum, span, mixtures");
   command->add_option("POPULATION", arguments->population, "Population package")->required();

@@ -9,8 +9,8 @@
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/features/feature_trainer.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/train/run_directory.h"
-#include "toolchain/train/threads.h"
 
 namespace figurine::cli {
 
@@ -35,7 +35,7 @@ void run(features::FeatureRequest request) {
 void add_features_command(CLI::App& app) {
   auto request = std::make_shared<features::FeatureRequest>();
   features::FeatureSettings& settings = request->settings;
-  request->threads = train::default_threads();
+  request->threads = model::default_threads();
   CLI::App* command = app.add_subcommand(
       "features", "Train figurine-features, through which pictures of avatars are compared");
   command

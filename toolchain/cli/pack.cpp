@@ -12,11 +12,11 @@
 #include "toolchain/error.h"
 #include "toolchain/generate/pack_sampler.h"
 #include "toolchain/generate/sampler_trainer.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/quantize/fine_tune.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/pack_population.h"
-#include "toolchain/train/threads.h"
 #include "toolchain/verify/golden_seeds.h"
 #include "toolchain/verify/parity.h"
 
@@ -160,7 +160,7 @@ void run(const PackArguments& arguments) {
 
 void add_pack_command(CLI::App& app) {
   auto arguments = std::make_shared<PackArguments>();
-  arguments->open.threads = train::default_threads();
+  arguments->open.threads = model::default_threads();
   CLI::App* command = app.add_subcommand(
       "pack", "Write a run's avatar or sampler as a package, or many avatars as a population");
   command

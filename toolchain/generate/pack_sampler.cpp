@@ -8,8 +8,8 @@
 #include "toolchain/error.h"
 #include "toolchain/generate/activation_ranges.h"
 #include "toolchain/generate/quantised_sampler.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/train/run_directory.h"
-#include "toolchain/train/threads.h"
 
 namespace figurine::generate {
 
@@ -62,7 +62,7 @@ std::vector<std::byte> pack_sampler(const PackSamplerOptions& options) {
         options.run +
         ": say --body: the activation ranges are found by posing the population's members");
   }
-  train::use_threads(options.threads);
+  model::use_threads(options.threads);
   const TrainedSampler trained = TrainedSampler::open(options.run, options.population);
   const Population& population = trained.population->package.population();
   const train::PackageFile body = train::open_package(options.body, PackageKind::kBody);

@@ -15,11 +15,11 @@
 #include "toolchain/generate/autoencoder.h"
 #include "toolchain/generate/flat_trainer.h"
 #include "toolchain/generate/tensors.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/random/counter.h"
 #include "toolchain/random/shuffled_order.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/run_directory.h"
-#include "toolchain/train/threads.h"
 
 namespace figurine::generate {
 
@@ -221,7 +221,7 @@ Plan make_plan(const SamplerRequest& request, const train::PackageFile& populati
     throw InputError(request.run + ": no run to resume (run.json is missing)");
   Plan plan{.settings = request.settings, .description = {}};
   if (!exists) {
-    if (plan.settings.threads == 0) plan.settings.threads = train::default_threads();
+    if (plan.settings.threads == 0) plan.settings.threads = model::default_threads();
     return plan;
   }
   plan.description = read_run(run);
@@ -403,7 +403,7 @@ SamplerResult train_sampler(const SamplerRequest& request) {
   SamplerSettings& settings = plan.settings;
   const Members members = members_of(population.package.population(), settings, request.population);
   const std::vector<measure::Token> tokens = tokens_of(population.package.population());
-  train::use_threads(settings.threads);
+  model::use_threads(settings.threads);
 
   // What can be wrong is found before anything is written: the tokens of `latent` are known before
   // its autoencoder is trained.

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "toolchain/error.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 
@@ -35,7 +36,7 @@ TrainedAvatar TrainedAvatar::open(const OpenRunOptions& options) {
     throw InputError(description.data + ": shape: is not the person of " + options.run);
   TrainSettings settings = description.settings;
   settings.threads = options.threads;
-  at::set_num_threads(static_cast<int>(options.threads));
+  model::use_threads(options.threads);
   avatar.model_ = std::make_unique<AvatarModel>(avatar.body_->package.body(), description.shape,
                                                 settings, false);
   if (!std::filesystem::exists(run.weights()))

@@ -12,6 +12,7 @@
 #include "toolchain/model/low_rank.h"
 #include "toolchain/model/optimiser.h"
 #include "toolchain/model/perceptual.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/describe_run.h"
@@ -73,9 +74,8 @@ struct PoseResult {
   StageSeconds stages;
 };
 
-// LibTorch's number of threads inside an operation belongs to the thread that calls it.
-void use_lane_threads(const TrainSettings& settings) {
-  at::set_num_threads(static_cast<int>(settings.threads / lane_count(settings)));
+uint32_t threads_a_lane(const TrainSettings& settings) {
+  return settings.threads / lane_count(settings);
 }
 
 // Of what learns of the network: all of it, its residual's factors, or nothing.
@@ -506,7 +506,8 @@ class Trainer {
   RunDirectory run_;
   nlohmann::json description_;
   People people_;
-  Lanes lanes_{lane_count(settings_), [settings = settings_] { use_lane_threads(settings); }};
+  Lanes lanes_{lane_count(settings_),
+               [count = threads_a_lane(settings_)] { model::use_threads(count); }};
   std::unique_ptr<model::LowRankResidual> residual_;  // null unless settings ask for one
   model::Optimiser optimiser_;                        // of what learns of the network
   TrainingState state_;
@@ -647,7 +648,7 @@ TrainResult train_avatar(const TrainRequest& request) {
     if (paths.size() > 1) description["people"] = list_people(paths);
     make_folder(request.run);
   }
-  use_lane_threads(settings);
+  model::use_threads(threads_a_lane(settings));
   model::keep_freed_memory();
   People people;
   for (size_t p = 0; p < paths.size(); ++p) {

@@ -8,8 +8,8 @@
 
 #include "toolchain/error.h"
 #include "toolchain/generate/tensors.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/tensor_operations.h"
-#include "toolchain/train/threads.h"
 
 namespace figurine::generate::autoencoder_test {
 namespace {
@@ -90,7 +90,7 @@ TEST(Autoencoder, LossIsTheErrorAndTheDivergenceOfThePosterior) {
 }
 
 TEST(Autoencoder, LearnsToGiveMembersBack) {
-  train::use_threads(1);
+  model::use_threads(1);
   const RowMatrix members = random_rows(5, kWidth, 6);
   auto autoencoder = std::make_shared<Autoencoder>(kWidth, settings().autoencoder, 7);
   Autoencoding autoencoding(autoencoder, settings(1e-4), members, members);

@@ -13,10 +13,10 @@
 #include "ports/host/folder_lock.h"
 #include "tests/toolchain/generate/small_people.h"
 #include "toolchain/error.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/tensor_file.h"
-#include "toolchain/train/threads.h"
 
 namespace figurine::generate::sampler_trainer_test {
 namespace {
@@ -129,13 +129,13 @@ TEST_F(SamplerTraining, GoesOnWithItsOwnThreadsUnlessToldOtherwise) {
   EXPECT_THROW(train_sampler(cut), train::Interrupted);
   cut.resume = true, cut.stop_after = 5;
   for (const auto& [asked, used] : {std::pair{0u, 1}, {2u, 2}}) {
-    train::use_threads(3);
+    model::use_threads(3);
     cut.settings.threads = asked;
     EXPECT_THROW(train_sampler(cut), train::Interrupted);
     EXPECT_EQ(at::get_num_threads(), used) << "asked for " << asked;
     cut.stop_after += 2;
   }
-  train::use_threads(1);
+  model::use_threads(1);
 }
 
 // Stopped in the autoencoder, and in the denoiser that follows.

@@ -1,4 +1,4 @@
-#include "toolchain/train/threads.h"
+#include "toolchain/model/threads.h"
 
 #include <dlfcn.h>
 
@@ -8,7 +8,7 @@
 
 #include "toolchain/tensor_operations.h"
 
-namespace figurine::train {
+namespace figurine::model {
 
 void use_threads(uint32_t count) {
   at::set_num_threads(static_cast<int>(count));
@@ -20,4 +20,4 @@ void use_threads(uint32_t count) {
 
 uint32_t default_threads() { return std::min(ports::usable_cpus(), 16u); }
 
-}  // namespace figurine::train
+}  // namespace figurine::model
