@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* kAntialiasedComment =
     "antialiased: trained with Mip-Splatting's 2D filter; draw with it (figurine splat "
-    "--antialiased, gsplat's rasterize_mode antialiased)";
+    "--antialiased, gsplat's rasterize_mode antialiased with eps2d 0.1)";
 
 struct ExportOptions {
   SceneOptions scene;

@@ -57,7 +57,8 @@ constexpr const char* kReferenceMeaning =
     "the same renderer with the alpha cut at 1e-7: every contribution that float arithmetic can "
     "tell from nothing is blended. The "
     "transmittance stop at 1e-4 "
-    "and the dilation of 0.3 px^2 are part of the definition of the picture and the same "
+    "and the dilation of a Gaussian by part of a pixel are part of the definition of the picture "
+    "and the same "
     "everywhere.";
 
 Dial alpha_cut_dial() {

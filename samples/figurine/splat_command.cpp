@@ -185,7 +185,7 @@ Command add_splat_command(CLI::App& app) {
       ->check(CLI::Range(1e-9f, 0.5f));
   command->add_flag("--antialiased", options->antialiased,
                     "for scenes that were trained with Mip-Splatting's 2D filter (gsplat: "
-                    "rasterize_mode antialiased); files do not say so");
+                    "rasterize_mode antialiased, eps2d 0.1); files do not say so");
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the camera's, or 1024x768");
   command->add_option("--background", options->background,
                       "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha");

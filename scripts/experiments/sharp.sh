@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# What static values, the network's size, the atlas and the filters are worth: two people, the
-# shipped one and one in pinstripes, each trained for ten minutes by today's preset and by the one
-# before it, and a row a change. Writes docs/results/stage1.json and docs/sharp.jpg.
+# What static values, the network's size, the atlas, the filters, a perceptual loss and a network
+# of somebody else are worth: two people, the shipped one and one in pinstripes, each trained for
+# ten minutes by today's preset and by the one before it, and a row a change. Writes
+# docs/results/stage1.json and docs/sharp.jpg.
 #
 #   scripts/experiments/sharp.sh [FOLDER]
 #
@@ -10,7 +11,8 @@
 # two at a time on one core each, which a busy machine cannot change.
 #
 # Environment: ITERATIONS (1000) of the rows, MINUTES (10) of the others, SEED (1) of the shipped
-# person, STRIPES_SEED (1) of the other, and ROWS (all), a list of names to limit training to. On
+# person, STRIPES_SEED (1) of the other, DONOR_SEED (2) of whose network the shipped person borrows
+# in some rows, and ROWS (all), a list of names to limit training to. On
 # two quiet cores about three hours.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
@@ -28,12 +30,20 @@ step "bodies"
 other_body body_mesh_layout --uv 128
 other_body body_256 --uv 256 "${body_options[@]}"
 
+wanted() {  # NAME...: one of them
+  local name
+  for name in "$@"; do case " ${ROWS:-$name} " in *" $name "*) return ;; esac done
+  return 1
+}
+identity=
 capture_person "$folder/capture" "${SEED:-1}"
 person=$identity
-capture_person "$folder/stripes" "${STRIPES_SEED:-1}" --outfit male_casualsuit03
+! wanted stripes stripes_before stripes_fine ||
+  capture_person "$folder/stripes" "${STRIPES_SEED:-1}" --outfit male_casualsuit03
 stripes=$identity
+! wanted donor || capture_person "$folder/donor" "${DONOR_SEED:-2}"
+donor=$identity
 
-wanted() { case " ${ROWS:-$1} " in *" $1 "*) ;; *) return 1 ;; esac; }
 
 # NAME DATA BODY OPTIONS...: trains and evaluates what is not there yet.
 row() {
@@ -51,13 +61,14 @@ row() {
 
 # Trained by the clock, on all cores. The preset before: no static values, a network for all texels
 # where the mesh's own layout has them.
-before=(--static-grids none --network-size 128 --learning-rate 2e-3)
+filters_off="--smallest-extent off --antialiased off"
+before="--static-grids none --network-size 128 --learning-rate 2e-3 $filters_off"
 fast=(--minutes "$minutes" --poses 2 --views-per-pose 2)
 timed="
 shipped|$person|body|
-before|$person|body_mesh_layout|${before[*]}
+before|$person|body_mesh_layout|$before
 stripes|$stripes|body|
-stripes_before|$stripes|body_mesh_layout|${before[*]}
+stripes_before|$stripes|body_mesh_layout|$before
 fine|$person|body_256|--preset fine
 stripes_fine|$stripes|body_256|--preset fine
 "
@@ -86,19 +97,31 @@ network_32|body|--network-size 32
 channels_24|body|--channels 24
 channels_16|body|--channels 16
 mesh_layout|body_mesh_layout|
-smallest_extent|body|--smallest-extent on
-antialiased|body|--antialiased on
-filters|body|--smallest-extent on --antialiased on
+no_smallest_extent|body|--smallest-extent off
+not_antialiased|body|--antialiased off
+no_filters|body|$filters_off
 sh_degree_1|body|--sh-degree 1
+perceptual|body|--perceptual samples/populations/edge_features.safetensors --perceptual-weight 0.02
 "
-while IFS='|' read -r name row_body options; do
-  [ -n "$name" ] && wanted "$name" || continue
-  while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n; done
-  # shellcheck disable=SC2086  # options are words
-  row "$name" "$person" "$row_body" --iterations "$iterations" --views-per-pose 2 --threads 1 \
-    $options &
-done <<< "$rows"
-while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done
+network_rows="
+network_of_another|body|--init $folder/runs/donor --freeze-network
+network_rank_8|body|--init $folder/runs/donor --network-rank 8
+init_another|body|--init $folder/runs/donor
+"
+short=(--iterations "$iterations" --views-per-pose 2 --threads 1)
+two_at_a_time() {  # ROWS
+  local name row_body options
+  while IFS='|' read -r name row_body options; do
+    [ -n "$name" ] && wanted "$name" || continue
+    while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n; done
+    # shellcheck disable=SC2086  # options are words
+    row "$name" "$person" "$row_body" "${short[@]}" $options &
+  done <<< "$1"
+  while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done
+}
+two_at_a_time "$rows"
+! wanted donor || row donor "$donor" body "${short[@]}"
+two_at_a_time "$network_rows"
 
 shipped=$folder/runs/shipped
 if [ -e "$shipped/evaluation.json" ]; then

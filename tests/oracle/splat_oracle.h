@@ -94,7 +94,8 @@ inline void sh_basis(uint32_t degree, double x, double y, double z, double* basi
   basis[15] = kSh3[6] * x * (x * x - 3 * y * y);
 }
 
-inline Splat project(const Gaussians& gaussians, size_t i, const Camera& camera) {
+inline Splat project(const Gaussians& gaussians, size_t i, const Camera& camera,
+                     bool antialiased = false) {
   Splat splat;
   const uint32_t coefficients = sh_coefficients(gaussians.sh_degree);
   const double* p = &gaussians.position_m[3 * i];
@@ -135,7 +136,7 @@ inline Splat project(const Gaussians& gaussians, size_t i, const Camera& camera)
     row_x[k] = fx / v[2] * (g[0] - tx * g[2]);
     row_y[k] = fy / v[2] * (g[1] - ty * g[2]);
   }
-  const double e = kDilationPx2;
+  const double e = antialiased ? kAntialiasedDilationPx2 : kDilationPx2;
   const double xx = row_x[0] * row_x[0] + row_x[1] * row_x[1] + row_x[2] * row_x[2];
   const double yy = row_y[0] * row_y[0] + row_y[1] * row_y[1] + row_y[2] * row_y[2];
   const double minors[3] = {row_x[1] * row_y[2] - row_x[2] * row_y[1],
@@ -178,7 +179,7 @@ inline double power_at(const Splat& splat, double dx, double dy) {
 
 struct Options {
   double alpha_cut = kAlphaCut;
-  bool antialiased = false;     // opacity sqrt(det / dilated det)
+  bool antialiased = false;     // another dilation, opacity sqrt(det / dilated det)
   double doubt = 1e-3;          // relative distance to a threshold within which a pixel is doubtful
   bool skip_far_pixels = true;  // leave out pixels outside the ellipse of the alpha cut (they fail
                                 // it): only saves time
@@ -187,7 +188,7 @@ struct Options {
 inline Image render(const Gaussians& gaussians, const Camera& camera, const Options& options = {}) {
   std::vector<Splat> splats;
   for (size_t i = 0; i < gaussians.count; ++i) {
-    Splat splat = project(gaussians, i, camera);
+    Splat splat = project(gaussians, i, camera, options.antialiased);
     if (options.antialiased) splat.opacity *= std::sqrt(splat.undilated / splat.determinant);
     if (splat.visible) splats.push_back(splat);
   }

@@ -25,8 +25,10 @@ struct ProjectionCamera {
   Scalar tangent_low[2], tangent_high[2];  // clamp of the Jacobian's x/z and y/z
   float depth_row[4];  // the depth key is float arithmetic in every instantiation
   float near;
+  Scalar dilation;  // e, px^2
 
-  explicit ProjectionCamera(const Camera& camera) {
+  explicit ProjectionCamera(const Camera& camera, bool antialiased = false)
+      : dilation(antialiased ? kAntialiasedDilationPx2 : kDilationPx2) {
     const auto& m = camera.view_from_world;
     for (int r = 0; r < 3; ++r) {
       for (int k = 0; k < 3; ++k) rotation[3 * r + k] = m[4 * r + k];
@@ -139,7 +141,7 @@ bool project(const ProjectionCamera<Scalar>& camera, const Scalar* position, con
   out.minors[0] = u[1] * v[2] - u[2] * v[1];
   out.minors[1] = u[2] * v[0] - u[0] * v[2];
   out.minors[2] = u[0] * v[1] - u[1] * v[0];
-  const Scalar e = Scalar(kDilationPx2);
+  const Scalar e = camera.dilation;
   out.a = uu + e;
   out.b = uv;
   out.c = vv + e;
@@ -175,7 +177,7 @@ void project_backward(const ProjectionCamera<Scalar>& camera, const Projected<Sc
                      gradient.q * Scalar(0.5) * inverse_c * inverse_c;
   // det = n.n + e (u.u + v.v) + e^2 with n = u x v; b = u.v; c = v.v + e
   const Scalar *u = at.row_x, *v = at.row_y, *n = at.minors;
-  const Scalar e = Scalar(kDilationPx2);
+  const Scalar e = camera.dilation;
   Scalar du[3], dv[3];
   for (int k = 0; k < 3; ++k) {
     const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;

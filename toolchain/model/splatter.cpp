@@ -100,7 +100,7 @@ struct Splatter<Scalar>::Impl {
 
 template <class Scalar>
 void Splatter<Scalar>::Impl::project_chunk(uint32_t begin, uint32_t end) {
-  const ProjectionCamera<Scalar> view(camera);
+  const ProjectionCamera<Scalar> view(camera, options.antialiased);
   const uint32_t sh_stride = 3 * sh_coefficients(gaussians.sh_degree);
   const Scalar cut = Scalar(options.alpha_cut), log2e = Scalar(1.4426950408889634074);
   const Scalar log2_cut = std::log2(cut);
@@ -212,7 +212,7 @@ size_t Splatter<Scalar>::Impl::tile_offset(uint32_t tile) const {
 template <class Scalar>
 void Splatter<Scalar>::Impl::backward_chunk(uint32_t begin, uint32_t end,
                                             const GaussianGradients<Scalar>& gradients) {
-  const ProjectionCamera<Scalar> view(camera);
+  const ProjectionCamera<Scalar> view(camera, options.antialiased);
   const uint32_t sh_stride = 3 * sh_coefficients(gaussians.sh_degree);
   for (uint32_t i = begin; i < end; ++i) {
     Scalar* const position = gradients.position_m + 3 * size_t(i);

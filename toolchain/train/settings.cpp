@@ -74,12 +74,14 @@ TrainSettings preset_settings(const std::string& name) {
   if (preset.network_step > 1) settings.network_size = preset.uv_size / preset.network_step;
   settings.schedule.peak = preset.learning_rate;
   settings.static_grids = parse_static_grids(preset.static_grids, name);
+  settings.smallest_extent = settings.antialiased = preset.filters;
   return settings;
 }
 
 TrainSettings network_alone(TrainSettings settings) {
   settings.network_size = 0;
   settings.static_grids.clear();
+  settings.smallest_extent = settings.antialiased = false;
   settings.schedule.peak = TrainSettings{}.schedule.peak;
   return settings;
 }

@@ -23,13 +23,14 @@ struct Preset {
   uint32_t network_step;     // T / T_n
   double learning_rate;      // of the network
   const char* static_grids;  // as parse_static_grids reads it
+  bool filters;              // smallest extents, and antialiased
 };
 
 inline constexpr std::array<Preset, 4> kPresets{
-    {{"nano", 32, 8, 0, 5, 1, 2e-3, "none"},
-     {"edge", 128, 32, 0, 5, 2, 1e-3, "all:T"},
-     {"fine", 256, 32, 0, 5, 4, 1e-3, "colour:T,rest:T/2"},  // faces from near by, fine cloth
-     {"paper", 256, 64, 3, 0, 1, 2e-3, "none"}}};
+    {{"nano", 32, 8, 0, 5, 1, 2e-3, "none", false},
+     {"edge", 128, 32, 0, 5, 2, 1e-3, "all:T", true},
+     {"fine", 256, 32, 0, 5, 4, 1e-3, "colour:T,rest:T/2", true},  // faces from near by, fine cloth
+     {"paper", 256, 64, 3, 0, 1, 2e-3, "none", false}}};
 
 // Throws InputError naming the known ones.
 const Preset& find_preset(const std::string& name);
@@ -133,7 +134,8 @@ void check_parts(const TrainSettings& settings, const std::string& where);
 
 // What a preset says of itself, all else as above.
 TrainSettings preset_settings(const std::string& name);
-// The same with a network for all texels and no static values: what a population's members are.
+// The same with a network for all texels, no static values and no filters: what a population's
+// members are.
 TrainSettings network_alone(TrainSettings settings);
 
 // bf16 where the CPU multiplies it in hardware, float elsewhere.

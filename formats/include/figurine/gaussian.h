@@ -27,7 +27,9 @@ inline constexpr std::array<float, 7> kSh3{
 inline constexpr float kShOffset = 0.5f;  // colour = max(SH(direction) + 0.5, 0), direction =
                                           // normalise(centre - camera centre) in world axes
 
-inline constexpr float kDilationPx2 = 0.3f;        // added to the diagonal of the 2D covariance
+inline constexpr float kDilationPx2 = 0.3f;  // added to the diagonal of the 2D covariance
+inline constexpr float kAntialiasedDilationPx2 =
+    0.1f;  // the same where splats are antialiased: about a pixel's own area
 inline constexpr float kAlphaCut = 1.0f / 255.0f;  // contributions with alpha below it are skipped
 inline constexpr float kAlphaMax = 0.99f;
 inline constexpr float kTransmittanceStop =

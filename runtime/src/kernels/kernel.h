@@ -26,7 +26,7 @@ constexpr int32_t kTileSize = 32;  // pixels a side
 constexpr int32_t kTilePixels = kTileSize * kTileSize;
 
 // The constants of splatting (figurine/gaussian.h says what they mean; table.cpp that they agree).
-constexpr float kDilationPx2 = 0.3f;
+constexpr float kDilationPx2 = 0.3f, kAntialiasedDilationPx2 = 0.1f;
 constexpr float kAlphaMax = 0.99f;
 constexpr float kTransmittanceStop = 1e-4f;
 constexpr float kShOffset = 0.5f;
@@ -159,7 +159,7 @@ struct ProjectJob {
   uint32_t count;  // lanes that hold a Gaussian, 1 to kLanes
   uint32_t sh_degree;
   uint32_t leave_out;    // ProjectLeaveOut
-  uint32_t antialiased;  // 1: the opacity makes up for the dilation (SplatOptions::antialiased)
+  uint32_t antialiased;  // 1: another dilation, and the opacity makes up for it (SplatOptions)
   Splat* splats;         // [kLanes], filled where visible
   float* depth_m;        // [kLanes], filled where visible
 };

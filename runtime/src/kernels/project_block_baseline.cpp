@@ -105,7 +105,7 @@ struct Covariance {
 
 // False if anything of it is not finite.
 bool project_covariance(const View& view, const GaussianBlock& gaussians, uint32_t lane,
-                        const Centre& centre, Covariance& covariance) {
+                        float dilation_px2, const Centre& centre, Covariance& covariance) {
   // Rows u, v of the projected factor J R F; the 2D covariance is their Gram matrix plus the
   // dilation.
   const float* m = view.view_from_world;
@@ -123,16 +123,16 @@ bool project_covariance(const View& view, const GaussianBlock& gaussians, uint32
     v[k] = focal_y * (gy - clamped_y * gz);
   }
   const float uu = dot(u, u), vv = dot(v, v);
-  covariance.a = uu + kDilationPx2;
+  covariance.a = uu + dilation_px2;
   covariance.b = dot(u, v);
-  covariance.c = vv + kDilationPx2;
+  covariance.c = vv + dilation_px2;
   // a c - b^2 would cancel for needles. By Cauchy-Binet it is the sum of the squared 2x2 minors of
   // [u; v] and of the dilation's terms: all positive.
   const float minors[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
                            u[0] * v[1] - u[1] * v[0]};
   covariance.undilated = dot(minors, minors);
   covariance.determinant =
-      covariance.undilated + kDilationPx2 * (uu + vv) + kDilationPx2 * kDilationPx2;
+      covariance.undilated + dilation_px2 * (uu + vv) + dilation_px2 * dilation_px2;
   return is_finite(covariance.a) && is_finite(covariance.b) && is_finite(covariance.c) &&
          is_finite(covariance.determinant);
 }
@@ -215,7 +215,7 @@ Lane project_lane(const ProjectJob& job, uint32_t lane) {
   Centre centre;
   Covariance covariance;
   if (!project_centre(view, gaussians, lane, centre) ||
-      !project_covariance(view, gaussians, lane, centre, covariance)) {
+      !project_covariance(view, gaussians, lane, dilation_of(job), centre, covariance)) {
     return Lane::kBehindOrNotFinite;
   }
   if (job.antialiased != 0) opacity = antialiased(opacity, covariance);

@@ -12,7 +12,9 @@ namespace figurine {
 // The words of kernels stand alone (kernel.h). What they must agree with:
 static_assert(kernels::kInfluences == kSkinInfluences && kernels::kMapPlanes == kMapChannels);
 static_assert(kernels::kMaxShValues == 3 * sh_coefficients(kMaxShDegree));
-static_assert(kernels::kDilationPx2 == kDilationPx2 && kernels::kAlphaMax == kAlphaMax &&
+static_assert(kernels::kDilationPx2 == kDilationPx2 &&
+              kernels::kAntialiasedDilationPx2 == kAntialiasedDilationPx2 &&
+              kernels::kAlphaMax == kAlphaMax &&
               kernels::kTransmittanceStop == kTransmittanceStop && kernels::kShOffset == kShOffset);
 static_assert(kernels::kShapeValues == kStaticColour &&
               kernels::kShapeValues + 3 == kStaticChannels && kernels::kHalfColour == kHalfColour);

@@ -135,13 +135,14 @@ TEST_P(ProjectBlock, AntialiasedTheDilationAddsNoWeight) {
   EXPECT_EQ(without.lanes.visible, 0xffffu);
   EXPECT_EQ(with.lanes.visible, 0xffe1u);
   EXPECT_EQ(with.lanes.transparent, 0x1eu);
-  // Variances (f s / z)^2 = 0.25 and 0.16 before 0.3 is added.
-  const double left = std::sqrt(0.25 * 0.16 / ((0.25 + 0.3) * (0.16 + 0.3)));
+  // Variances (f s / z)^2 = 0.25 and 0.16 before 0.1 is added.
+  const double left = std::sqrt(0.25 * 0.16 / ((0.25 + 0.1) * (0.16 + 0.1)));
   EXPECT_EQ(without.splats[0].opacity, 0.8f);
   EXPECT_NEAR(with.splats[0].opacity, 0.8 * left, 1e-6);
   EXPECT_NEAR(with.splats[0].reach, std::log2(0.8 * left * 255) + 1e-3, 1e-4);
   EXPECT_LT(with.splats[0].half_height, without.splats[0].half_height);
-  EXPECT_EQ(with.splats[0].scale_u, without.splats[0].scale_u) << "as wide as before";
+  EXPECT_NEAR(without.splats[0].scale_u, std::sqrt(0.5 * M_LOG2E / (0.25 + 0.3)), 1e-5);
+  EXPECT_NEAR(with.splats[0].scale_u, std::sqrt(0.5 * M_LOG2E / (0.25 + 0.1)), 1e-5);
   // Where nothing is left out they come along and reach nothing.
   const Projected all = project(block, kernels::kLanes, 0, true);
   EXPECT_EQ(all.lanes.visible, 0xffffu);

@@ -30,12 +30,12 @@ void expect_small(const testing::GradientErrors& errors, uint32_t degree) {
 
 TEST(SplatGradients, EqualFiniteDifferencesForEveryShDegree) {
   for (uint32_t degree = 0; degree <= kMaxShDegree; ++degree)
-    expect_small(testing::check_splat_gradients(degree, 120), degree);
+    expect_small(testing::check_splat_gradients(degree, 60), degree);
 }
 
 // Deviations are around a pixel, so that what the dilation takes from opacities changes steeply.
 TEST(SplatGradients, AntialiasedEqualFiniteDifferences) {
-  expect_small(testing::check_splat_gradients(0, 120, true), 0);
+  expect_small(testing::check_splat_gradients(0, 60, true), 0);
 }
 
 TEST(HeadGradients, EqualFiniteDifferencesThroughSkinningAndSplatting) {
