@@ -20,8 +20,8 @@ Summary summarise(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const size_t n = values.size();
   const double median = n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-  const auto rank = static_cast<size_t>(std::ceil(0.9 * static_cast<double>(n)));
-  return {median, values[rank - 1]};
+  const auto at_rank = [&](size_t percent) { return values[(percent * n + 99) / 100 - 1]; };
+  return {median, at_rank(90), at_rank(99)};
 }
 
 void FrameLog::add(const FrameStatistics& statistics, uint64_t total_ns) {
@@ -38,6 +38,11 @@ void FrameLog::add(const FrameStatistics& statistics, uint64_t total_ns) {
   stale_networks_ += statistics.stale_networks;
 }
 
+uint64_t FrameLog::missed_60hz() const {
+  return static_cast<uint64_t>(std::count_if(total_ms_.begin(), total_ms_.end(),
+                                             [](double ms) { return ms > 1000.0 / 60; }));
+}
+
 Summary FrameLog::stages_ms(std::span<const Stage> stages) const {
   std::vector<double> sums(frames(), 0);
   for (const Stage stage : stages) {
@@ -50,7 +55,8 @@ Summary FrameLog::stages_ms(std::span<const Stage> stages) const {
 nlohmann::ordered_json FrameLog::stages_json() const {
   const auto entry = [](const Summary& summary) {
     return nlohmann::ordered_json{{"median", rounded(summary.median)},
-                                  {"p90", rounded(summary.p90)}};
+                                  {"p90", rounded(summary.p90)},
+                                  {"p99", rounded(summary.p99)}};
   };
   nlohmann::ordered_json json = {{"total", entry(total_ms())}};
   for (size_t s = 0; s < kStageCount; ++s)

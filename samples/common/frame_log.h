@@ -12,7 +12,7 @@ namespace figurine::samples {
 
 struct Summary {
   double median = 0;
-  double p90 = 0;  // nearest rank
+  double p90 = 0, p99 = 0;  // nearest rank
 };
 // Zeros without values.
 Summary summarise(std::vector<double> values);
@@ -22,10 +22,13 @@ class FrameLog {
   void add(const FrameStatistics& statistics, uint64_t total_ns);
   size_t frames() const { return total_ms_.size(); }
   Summary total_ms() const { return summarise(total_ms_); }
+  // Frames that took longer than a screen of 60 Hz waits.
+  uint64_t missed_60hz() const;
   // Of some stages together, summed within each frame.
   Summary stages_ms(std::span<const Stage> stages) const;
 
-  // {"total": {"median": ms, "p90": ms}, "maps": {...}, ...}, in the order of the stages.
+  // {"total": {"median": ms, "p90": ms, "p99": ms}, "maps": {...}, ...}, in the order of the
+  // stages.
   nlohmann::ordered_json stages_json() const;
   // Medians of Gaussians, visible, pairs, blends and macs; means of runs of networks and of those
   // that were left out.

@@ -256,10 +256,6 @@ Status draw_pictures(SettingRenderer& drawing, uint32_t frame, const Dial& dial,
   return {};
 }
 
-nlohmann::ordered_json finite_or_null(double value) {
-  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
-}
-
 // Slope of log error over log value by least squares; null where fewer than two settings have an
 // error.
 nlohmann::ordered_json overall_order(const Dial& dial,

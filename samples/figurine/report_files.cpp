@@ -1,5 +1,6 @@
 #include "samples/figurine/report_files.h"
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -8,6 +9,10 @@
 #include "ports/host/files.h"
 
 namespace figurine::samples {
+
+nlohmann::ordered_json finite_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
+}
 
 // The second is written only if the first could be, and takes it along if it fails.
 Status write_report(const std::string& folder, const nlohmann::ordered_json& json,

@@ -46,7 +46,7 @@ constexpr Solver kSolvers[] = {
     {SolverMethod::kDdim, "steps of DDIM, each with one evaluation of the denoiser", 1,
      "One prediction is held over the step: the error falls with the step."}};
 
-struct Setting {
+struct SolverSetting {
   ErrorSum error;
   std::vector<double> ms;
 };
@@ -118,20 +118,18 @@ Result<ReportPicture> shown(const std::string& caption, const ports::ImageF32& p
   return ReportPicture{caption, std::move(*png)};
 }
 
-Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-
 // Slope of log error over log step between two settings, coarse and fine.
-double order_between(const std::vector<Setting>& settings, size_t coarse, size_t fine) {
+double order_between(const std::vector<SolverSetting>& settings, size_t coarse, size_t fine) {
   return std::log(settings[coarse].error.rmse() / settings[fine].error.rmse()) /
          std::log(double(kEvaluations[fine]) / kEvaluations[coarse]);
 }
 
 // What more evaluations do not buy: the integers' rounding, and the reference's own error. The
 // smallest error that any setting of any solver reaches.
-double noise_floor(const std::vector<std::vector<Setting>>& solvers) {
+double noise_floor(const std::vector<std::vector<SolverSetting>>& solvers) {
   double least = std::numeric_limits<double>::infinity();
-  for (const std::vector<Setting>& settings : solvers) {
-    for (const Setting& setting : settings) least = std::min(least, setting.error.rmse());
+  for (const std::vector<SolverSetting>& settings : solvers) {
+    for (const SolverSetting& setting : settings) least = std::min(least, setting.error.rmse());
   }
   return least;
 }
@@ -139,7 +137,7 @@ double noise_floor(const std::vector<std::vector<Setting>>& solvers) {
 // Settings [first, last] over which a solver's order can be observed: the three finest whose error
 // is at least four times the floor, which is then 3 % of it. Coarser ones have steps too large for
 // the theory. None where fewer are above the floor.
-std::optional<std::pair<size_t, size_t>> observable(const std::vector<Setting>& settings,
+std::optional<std::pair<size_t, size_t>> observable(const std::vector<SolverSetting>& settings,
                                                     double floor) {
   constexpr double kAboveFloor = 4;
   constexpr size_t kSettings = 3;
@@ -150,7 +148,7 @@ std::optional<std::pair<size_t, size_t>> observable(const std::vector<Setting>& 
 }
 
 Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs,
-               const std::vector<Setting>& settings, double floor) {
+               const std::vector<SolverSetting>& settings, double floor) {
   Json json = {{"name", std::string("step of ") + to_string(solver.method)},
                {"meaning", solver.meaning},
                {"theoretical_order", solver.order},
@@ -161,7 +159,7 @@ Json dial_json(const Solver& solver, const Sampler& sampler, uint64_t macs,
                {"stages", {"sampling"}},
                {"settings", Json::array()}};
   for (size_t s = 0; s < settings.size(); ++s) {
-    const Setting& setting = settings[s];
+    const SolverSetting& setting = settings[s];
     Json row = {{"label", std::to_string(kEvaluations[s])},
                 {"value", 1.0 / kEvaluations[s]},
                 {"default", solver.method == sampler.method && kEvaluations[s] == sampler.steps},
@@ -192,8 +190,8 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
   Result<std::unique_ptr<PersonRenderer>> made = PersonRenderer::create(package, options);
   if (!made.ok()) return made.status();
   PersonRenderer& people = **made;
-  std::vector<std::vector<Setting>> settings(std::size(kSolvers),
-                                             std::vector<Setting>(std::size(kEvaluations)));
+  std::vector<std::vector<SolverSetting>> settings(
+      std::size(kSolvers), std::vector<SolverSetting>(std::size(kEvaluations)));
   std::vector<ReportPicture> pictures;
   Progress progress("report", options.seeds * std::size(kSolvers) * std::size(kEvaluations));
   uint64_t done = 0;

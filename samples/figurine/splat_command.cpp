@@ -1,21 +1,18 @@
 // figurine splat: any standard file of 3D Gaussians, into one image.
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "ports/host/clock.h"
 #include "ports/host/files.h"
-#include "samples/common/camera_matrix.h"
 #include "samples/common/camera_spec.h"
 #include "samples/common/device_options.h"
 #include "samples/common/file_sink.h"
 #include "samples/common/frame_log.h"
-#include "samples/common/framing.h"
 #include "samples/common/machine.h"
 #include "samples/common/rendered_frame.h"
 #include "samples/figurine/commands.h"
-#include "samples/gaussians/ply.h"
+#include "samples/figurine/gaussian_scene.h"
 
 namespace figurine::samples {
 
@@ -28,43 +25,6 @@ struct SplatCommandOptions {
   bool antialiased = false;
   DeviceOptions device;
 };
-
-constexpr ImageSize kDefaultSize{1024, 768};
-// Captured scenes have a subject in the middle and stray Gaussians far out: the picture holds the
-// inner nine tenths.
-constexpr FramingOptions kSceneFraming{.share = 0.9, .margin = 0.05};
-constexpr float kOpacitySeen = 0.1f;
-
-// The rotation that turns the file's up axis into +y.
-glm::mat3 upright(const std::string& up) {
-  constexpr glm::vec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
-  if (up == "-y") return {x, -y, -z};
-  if (up == "+z") return {x, -z, y};
-  if (up == "-z") return {x, z, -y};
-  return {x, y, z};
-}
-
-// An orbit around the scene's robust centre, in its own axes.
-Result<Camera> orbit_scene(const GaussianCloud& cloud, std::optional<OrbitCamera> wanted,
-                           const std::string& up, ImageSize size) {
-  const glm::mat3 turn = upright(up);
-  std::vector<Point> points;
-  for (uint32_t i = 0; i < cloud.count(); ++i) {
-    if (!(cloud.opacity[i] >= kOpacitySeen)) continue;
-    const float* p = &cloud.position_m[3 * size_t(i)];
-    const glm::vec3 point = turn * glm::make_vec3(p);
-    points.push_back({point.x, point.y, point.z});
-  }
-  OrbitCamera orbit = wanted.value_or(OrbitCamera{.azimuth_deg = 25, .elevation_deg = 12});
-  orbit.target_m = robust_centre(points, kSceneFraming.share);
-  if (!wanted)
-    orbit.distance_m = fit_distance_m(
-        points, orbit, static_cast<double>(size.width_px) / size.height_px, kSceneFraming);
-  Result<Camera> camera = make_orbit_camera(orbit, size.width_px, size.height_px);
-  if (!camera.ok()) return camera;
-  set_view_matrix(*camera, view_matrix(*camera) * glm::mat4(turn));
-  return camera;
-}
 
 Result<Camera> choose_camera(const SplatCommandOptions& options, const GaussianCloud& cloud) {
   std::optional<ImageSize> size;
@@ -84,9 +44,10 @@ Result<Camera> choose_camera(const SplatCommandOptions& options, const GaussianC
     const bool has_size = spec.fixed->width_px != 0;
     camera = resize_camera(
         *spec.fixed, size.value_or(has_size ? ImageSize{spec.fixed->width_px, spec.fixed->height_px}
-                                            : kDefaultSize));
+                                            : kSceneSize));
   } else {
-    camera = orbit_scene(cloud, spec.orbit, options.up, size.value_or(kDefaultSize));
+    const ImageSize wanted = size.value_or(kSceneSize);
+    camera = scene_camera(orbit_scene(cloud, spec.orbit, options.up, wanted), options.up, wanted);
   }
   if (!camera.ok()) return camera;
   if (options.near_m) camera->near_m = *options.near_m;
@@ -105,13 +66,8 @@ Status run_splat(const SplatCommandOptions& options) {
                   options.output + ": a scene does not move; write .png or .pfm");
   }
 
-  Result<ports::MappedFile> file = ports::MappedFile::open(options.scene);
-  if (!file.ok()) return file.status();
-  const Result<GaussianCloud> cloud = read_gaussian_ply(file->bytes(), options.scene);
+  const Result<GaussianCloud> cloud = read_scene(options.scene);
   if (!cloud.ok()) return cloud.status();
-  if (cloud->count() == 0)
-    return Status(StatusCode::kInvalidArgument,
-                  options.scene + ": ply: holds no Gaussian that can be drawn");
   const Result<Camera> camera = choose_camera(options, *cloud);
   if (!camera.ok()) return camera.status();
   const ImageSize size{camera->width_px, camera->height_px};
@@ -173,7 +129,7 @@ Command add_splat_command(CLI::App& app) {
   command
       ->add_option("--up", options->up,
                    "which axis of the file points up, for orbits: +y, -y, +z or -z")
-      ->check(CLI::IsMember({"+y", "-y", "+z", "-z"}))
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
       ->capture_default_str();
   command
       ->add_option("--near", options->near_m,

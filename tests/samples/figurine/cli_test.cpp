@@ -389,7 +389,11 @@ TEST_F(Cli, BenchReportsEveryStage) {
   EXPECT_EQ(json["runs"][1]["threads"], 2);
   for (const Json& lane : json["runs"]) {
     EXPECT_EQ(lane["stages_ms"].size(), 10u);
-    EXPECT_GT(lane["stages_ms"]["total"]["median"], 0.0);
+    const Json& total = lane["stages_ms"]["total"];
+    EXPECT_GT(total["median"], 0.0);
+    EXPECT_GE(total["p90"], total["median"]);
+    EXPECT_GE(total["p99"], total["p90"]);
+    EXPECT_LE(lane["missed_60hz"], 10);
     EXPECT_GT(lane["work"]["macs"], 0);
     EXPECT_GT(lane["work"]["blends"], 0);
     if (!lane["allocations_per_frame"].is_null()) {
@@ -417,6 +421,47 @@ TEST_F(Cli, SmallFiguresMayKeepWhatTheirNetworkSaid) {
   EXPECT_EQ(kept["work"]["stale_networks"], 0.75);
   EXPECT_EQ(work("--network-below-px 8")["work"]["networks"], 1.0);
   EXPECT_EQ(run("render P/avatar.fgn -o x.png --network-below-px -1").exit_code, 2);
+}
+
+TEST_F(Cli, BenchTakesSeveralFigures) {
+  const auto bench = [&](const std::string& arguments) {
+    const ProgramRun result = run("bench " + arguments + " --frames 3 --threads 1 --json -");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.exit_code == 0 ? Json::parse(result.out) : Json();
+  };
+  const Json one = bench("P/both.fgn --size 64x64"),
+             three = bench("P/both.fgn P/both.fgn P/fixed.fgn --size 64x64");
+  ASSERT_EQ(three["runs"].size(), 1u) << "what all of them hold";
+  EXPECT_EQ(three["runs"][0]["precision"], "q8");
+  EXPECT_EQ(three["runs"][0]["work"]["networks"], 3.0);
+  EXPECT_EQ(three["avatars"].size(), 3u);
+  EXPECT_GT(three["avatar_bytes"], one["avatar_bytes"]);
+  EXPECT_EQ(three["body_bytes"], one["body_bytes"]) << "they share one";
+  const Json mixed = bench("P/avatar.fgn P/fixed.fgn --size 64x64");
+  ASSERT_EQ(mixed["runs"].size(), 1u);
+  EXPECT_EQ(mixed["runs"][0]["precision"], "mixed");
+}
+
+TEST_F(Cli, BenchTakesASceneOfGaussians) {
+  folder_.write("scene.ply", make_ply(standard_columns(1), 30, PlyEncoding::kLittle, sample_value));
+  const ProgramRun result = run("bench scene.ply --size 64x48 --frames 4 --threads 2 --json -");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = Json::parse(result.out);
+  EXPECT_EQ(json["scene"], "scene.ply");
+  EXPECT_TRUE(json["avatars"].empty());
+  EXPECT_EQ(json["size"], Json({64, 48}));
+  ASSERT_EQ(json["runs"].size(), 2u);
+  for (const Json& lane : json["runs"]) {
+    EXPECT_TRUE(lane["precision"].is_null());
+    EXPECT_EQ(lane["work"]["gaussians"], 30);
+    EXPECT_GT(lane["work"]["blends"], 0);
+    EXPECT_EQ(lane["work"]["macs"], 0);
+  }
+  EXPECT_NE(run("bench scene.ply --size 64x48 --frames 2").out.find("from all around"),
+            std::string::npos);
+  EXPECT_EQ(run("bench scene.ply P/both.fgn").exit_code, 1);
+  EXPECT_EQ(run("bench scene.ply --motion P/motion.fgn").exit_code, 1);
+  EXPECT_EQ(run("bench P/both.fgn --framing feet").exit_code, 2);
 }
 
 TEST_F(Cli, BenchMeasuresEveryPrecisionThatThePackageHolds) {
