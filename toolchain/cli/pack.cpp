@@ -94,6 +94,11 @@ void run_population(PackArguments arguments) {
 void run_avatar(PackArguments arguments) {
   arguments.open.run = arguments.inputs.front();
   train::TrainedAvatar avatar = train::TrainedAvatar::open(arguments.open);
+  if (!avatar.model().has_network() && (arguments.precision != "f32" || arguments.fine_tune)) {
+    throw InputError(arguments.open.run +
+                     ": has no network; --precision and --qat say how to round one (static values "
+                     "are in 8 bits anyway)");
+  }
   std::optional<quantize::QuantisedNetwork> quantised;
   if (arguments.precision != "f32") {
     arguments.fine_tuning.threads = arguments.open.threads;

@@ -118,5 +118,26 @@ TEST(Threads, NetworksRunOnThoseThatGiveWay) {
     EXPECT_NE(line.find("/figurine-train [0]: "), std::string::npos) << line;
 }
 
+TEST(PackCommand, WhatHasNoNetworkHasNonePacked) {
+  const TestFolder folder;
+  const ProgramRun run =
+      train(folder, "--data " + small_capture().data + " --body " + small_capture().body +
+                        " --preset nano --network none --static-grids all:T --iterations 2 "
+                        "--threads 1 --quiet");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto pack = [&](const std::string& options) {
+    return tests::run_shell(FIGURINE_TRAIN " pack run -o a.fgn " + options, folder);
+  };
+  for (const char* options : {"--precision q8", "--precision f32,q8", "--qat --precision q8"}) {
+    const ProgramRun refused = pack(options);
+    EXPECT_EQ(refused.exit_code, 1) << options;
+    EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+    EXPECT_NE(refused.err.find("run: has no network"), std::string::npos) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(folder.path("a.fgn")));
+  }
+  const ProgramRun packed = pack("");
+  EXPECT_EQ(packed.exit_code, 0) << packed.err;
+}
+
 }  // namespace
 }  // namespace figurine::cli::avatar_test
