@@ -130,7 +130,7 @@ TEST_P(ProjectBlock, AntialiasedTheDilationAddsNoWeight) {
   block.factor[0][2] = 0.1f, block.factor[4][2] = 0;   // a disc seen edge-on
   block.factor[8][2] = 0.1f;
   block.factor[0][3] = block.factor[4][3] = block.factor[8][3] = 1e-25f;  // squares underflow
-  block.opacity[4] = 0.0095f;  // above the cut until its dilation is made up for
+  block.opacity[4] = 0.005f;  // above the cut until its dilation is made up for
   const Projected without = project(block), with = project(block, kernels::kLanes, kLeaveOut, true);
   EXPECT_EQ(without.lanes.visible, 0xffffu);
   EXPECT_EQ(with.lanes.visible, 0xffe1u);
