@@ -79,14 +79,19 @@ endfunction()
 # the CPU time.
 set(FIGURINE_TEST_ENVIRONMENT "OMP_NUM_THREADS=1" "OMP_WAIT_POLICY=passive")
 
-# What takes time in a test is in the libraries. For the owner of the tests' precompiled header too:
-# GCC takes one only where both are optimised alike.
-set(FIGURINE_TEST_OPTIONS $<$<NOT:$<CONFIG:Debug>>:-O1>)
+# What takes time in a test is in the libraries: under sanitizers, and where it uses LibTorch, a
+# test's own code is compiled as written. For the owners of the tests' precompiled headers too: GCC
+# takes one only where both are optimised alike.
+if(FIGURINE_SANITIZE)
+  set(FIGURINE_TEST_OPTIONS -O0)
+else()
+  set(FIGURINE_TEST_OPTIONS $<$<NOT:$<CONFIG:Debug>>:-O1>)
+endif()
+set(FIGURINE_TENSOR_TEST_OPTIONS -O0)
 
 # figurine_test_program(NAME LIBRARIES...): a GoogleTest program for several figurine_test(... IN
 # NAME), whose files are compiled together and linked once. TENSORS: its files compute with
-# LibTorch's tensors, and are compiled with figurine_model's precompiled header in place of
-# GoogleTest's.
+# LibTorch's tensors, and are compiled with a precompiled header of both.
 function(figurine_test_program name)
   cmake_parse_arguments(arg "TENSORS" "" "LIBRARIES;DEFINITIONS" ${ARGN})
   add_executable(${name})
@@ -97,7 +102,8 @@ function(figurine_test_program name)
   target_compile_options(${name} PRIVATE -fPIC)  # as the owners of precompiled headers, not -fPIE
   set_target_properties(${name} PROPERTIES UNITY_BUILD_BATCH_SIZE 16)
   if(arg_TENSORS)
-    target_precompile_headers(${name} REUSE_FROM figurine_model)
+    target_compile_options(${name} PRIVATE ${FIGURINE_TENSOR_TEST_OPTIONS})
+    target_precompile_headers(${name} REUSE_FROM figurine_tensor_test_header)
   else()
     target_compile_options(${name} PRIVATE ${FIGURINE_TEST_OPTIONS})
     target_precompile_headers(${name} REUSE_FROM figurine_test_header)

@@ -1,1 +1,1 @@
-// Owner of the precompiled header of the test programs (CMakeLists.txt): a library needs a source.
+// Owner of the precompiled headers of the test programs (CMakeLists.txt): a library needs a source.

@@ -44,7 +44,6 @@ stripes=$identity
 ! wanted donor || capture_person "$folder/donor" "${DONOR_SEED:-2}"
 donor=$identity
 
-
 # NAME DATA BODY OPTIONS...: trains and evaluates what is not there yet.
 row() {
   local name=$1 data=$2 row_body=$folder/$3.fgn run=$folder/runs/$1

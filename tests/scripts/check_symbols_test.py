@@ -119,9 +119,9 @@ def build(folder, sources, exported=None):
             subprocess.run(["ar", "rc", str(path), str(item)], check=True)
 
 
-def check(folder):
-    run = subprocess.run([sys.executable, str(CHECKER), str(folder)], capture_output=True,
-                         text=True, check=False)
+def check(folder, *options):
+    run = subprocess.run([sys.executable, str(CHECKER), *options, str(folder)],
+                         capture_output=True, text=True, check=False)
     return run.returncode, run.stdout + run.stderr
 
 
@@ -139,6 +139,20 @@ class CheckSymbols(unittest.TestCase):
         code, report = check(self.folder.name)
         self.assertEqual(code, 0, report)
         self.assertRegex(report, r"0 findings; \d+ bytes stripped and \d+ of the pool")
+
+    def test_looks_at_programs_unless_only_the_library_is_built(self):
+        breach = "#include <cstdlib>\nchar* f() { return std::getenv(\"A\"); }"
+        build(self.folder.name, {SO: breach})
+        for program in PROGRAMS:
+            pathlib.Path(self.folder.name, program).unlink()
+        code, report = check(self.folder.name)
+        self.assertEqual(code, 1, report)
+        self.assertIn(f"there is no {PROGRAMS[0]}", report)
+        code, report = check(self.folder.name, "--library")
+        self.assertEqual(code, 1, report)
+        self.assertIn("environment: getenv", report)
+        build(self.folder.name, {SO: SOUND})
+        self.assertEqual(check(self.folder.name, "--library")[0], 0)
 
     def test_names_every_kind_of_breach(self):
         for name, source, words in BREACHES:

@@ -116,7 +116,7 @@ TEST(BuildPopulation, KilledAnywhereItGoesOnToTheSameBits) {
   build(place.options("straight"));
   // Killed at growing distances from its start, until a build lives to its end.
   int kills = 0;
-  for (int delay_ms = 400;; delay_ms += 700) {
+  for (int delay_ms = 400;; delay_ms += 1400) {
     ASSERT_LT(kills, 60);
     const pid_t child = fork();
     ASSERT_GE(child, 0);

@@ -1,5 +1,6 @@
 // Training itself, at the smallest size that shows anything: it beats a flat colour, a resumed run
 // equals an uninterrupted one, bad input is refused.
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -12,6 +13,7 @@
 #include "tests/toolchain/train/requests.h"
 #include "toolchain/error.h"
 #include "toolchain/model/perceptual.h"
+#include "toolchain/model/threads.h"
 #include "toolchain/pictures/contact_sheet.h"
 #include "toolchain/reconstruction/idle_channels.h"
 #include "toolchain/reconstruction/reconstruction.h"
@@ -46,6 +48,21 @@ const std::string& trained_run() {
     return folder.path("run");
   }();
   return run;
+}
+
+// The BLAS that scripts/setup installs; two trainings side by side have a core each.
+TEST(Training, ItsThreadsAreOpenBlasToo) {
+  const auto blas_threads =
+      reinterpret_cast<int (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_num_threads"));
+  ASSERT_NE(blas_threads, nullptr);
+  const TemporaryFolder folder;
+  model::use_threads(2);
+  ASSERT_EQ(blas_threads(), 2);
+  train_avatar(request(folder.path("run"), 2));
+  EXPECT_EQ(blas_threads(), 1);
+  TrainedAvatar::open({.run = folder.path("run"), .threads = 2});
+  EXPECT_EQ(blas_threads(), 2);
+  model::use_threads(1);
 }
 
 TEST(Training, BeatsAFlatColourOnHeldOutViewsAndPoses) {
