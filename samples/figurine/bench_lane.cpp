@@ -96,8 +96,7 @@ Result<BenchLane> BenchLane::open(const BenchSubject& subject, RendererOptions r
 }
 
 Status BenchLane::render(uint32_t i, RenderedFrame& frame, bool measured) {
-  const std::span<const FrameAvatar> posed =
-      scene_ ? pose(i) : std::span<const FrameAvatar>();
+  const std::span<const FrameAvatar> posed = scene_ ? pose(i) : std::span<const FrameAvatar>();
   const GaussianView view = cloud_ ? cloud_->view() : GaussianView();
   const std::span<const GaussianView> gaussians(&view, cloud_ ? 1 : 0);
   if (measured) start_counting_allocations();
@@ -125,10 +124,10 @@ nlohmann::ordered_json BenchLane::json() const {
   json["missed_60hz"] = log_.missed_60hz();
   json["stages_ms"] = log_.stages_json();
   json["work"] = log_.work_json();
-  json["allocations_per_frame"] =
-      can_count_allocations() ? nlohmann::ordered_json(static_cast<double>(allocations_) /
-                                                       static_cast<double>(log_.frames()))
-                              : nullptr;
+  json["allocations_per_frame"] = can_count_allocations()
+                                      ? nlohmann::ordered_json(static_cast<double>(allocations_) /
+                                                               static_cast<double>(log_.frames()))
+                                      : nullptr;
   json["renderer_memory_bytes"] = renderer_->memory_bytes();
   return json;
 }

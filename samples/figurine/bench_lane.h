@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "samples/common/framing.h"
 #include "samples/common/frame_log.h"
+#include "samples/common/framing.h"
 #include "samples/common/rendered_frame.h"
 #include "samples/common/scene.h"
 #include "samples/figurine/gaussian_scene.h"

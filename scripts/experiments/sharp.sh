@@ -89,6 +89,7 @@ static_colour_only|body|--static-grids colour:T
 static_half|body|--static-grids all:T/2
 static_sum|body|--static-colour sum
 static_learning_rate_5e-3|body|--static-learning-rate 5e-3
+static_learning_rate_3e-2|body|--static-learning-rate 3e-2
 static_penalty_1e-2|body|--static-penalty 1e-2
 network_none|body|--network none
 network_128|body|--network-size 128
