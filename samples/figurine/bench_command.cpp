@@ -253,7 +253,7 @@ Command add_bench_command(CLI::App& app) {
       ->check(CLI::IsMember({"body", "bust", "head"}))
       ->capture_default_str();
   command->add_option("--up", subject.up, "which axis of a .ply file points up: +y, -y, +z or -z")
-      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
+      ->check(CLI::IsMember(kUpAxes))
       ->capture_default_str();
   options->device.add_to(*command, false);
   add_options(*command, subject.approximation);

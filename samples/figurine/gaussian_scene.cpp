@@ -1,7 +1,5 @@
 #include "samples/figurine/gaussian_scene.h"
 
-#include <vector>
-
 #include "ports/host/files.h"
 #include "samples/common/camera_matrix.h"
 #include "samples/common/framing.h"

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "figurine/camera.h"
 #include "figurine/status.h"
@@ -15,7 +16,7 @@ namespace figurine::samples {
 inline constexpr ImageSize kSceneSize{1024, 768};
 
 // The file's axes that may point up, for --up.
-inline constexpr const char* kUpAxes[] = {"+y", "-y", "+z", "-z"};
+inline const std::vector<std::string> kUpAxes{"+y", "-y", "+z", "-z"};
 
 // read_gaussian_ply() of the file; one without any Gaussian is refused.
 Result<GaussianCloud> read_scene(const std::string& path);

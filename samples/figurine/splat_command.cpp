@@ -129,7 +129,7 @@ Command add_splat_command(CLI::App& app) {
   command
       ->add_option("--up", options->up,
                    "which axis of the file points up, for orbits: +y, -y, +z or -z")
-      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
+      ->check(CLI::IsMember(kUpAxes))
       ->capture_default_str();
   command
       ->add_option("--near", options->near_m,

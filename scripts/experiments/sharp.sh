@@ -132,8 +132,9 @@ if [ -e "$shipped/evaluation.json" ]; then
   train pack "$shipped" --precision q8 -o "$folder/shipped_q8.fgn"
   train evaluate parity --run "$shipped" --package "$folder/shipped.fgn" \
     --precision q8 -o "$folder/parity_q8.json"
-  train evaluate reconstruction --run "$shipped" --beside "$folder/runs/before" \
-    --sheet docs/sharp.jpg > /dev/null
+  [ ! -e "$folder/runs/before/evaluation.json" ] ||
+    train evaluate reconstruction --run "$shipped" --beside "$folder/runs/before" \
+      --sheet docs/sharp.jpg > /dev/null
 fi
 step "docs/results/stage1.json"
 scripts/run python3 scripts/experiments/sharp_report.py "$folder" docs/results/stage1.json \

@@ -393,7 +393,8 @@ TEST_F(Cli, BenchReportsEveryStage) {
     EXPECT_GT(total["median"], 0.0);
     EXPECT_GE(total["p90"], total["median"]);
     EXPECT_GE(total["p99"], total["p90"]);
-    EXPECT_LE(lane["missed_60hz"], 10);
+    // The 99th of 100 is the longest of ten.
+    EXPECT_EQ(lane["missed_60hz"] > 0, total["p99"] > 1000.0 / 60);
     EXPECT_GT(lane["work"]["macs"], 0);
     EXPECT_GT(lane["work"]["blends"], 0);
     if (!lane["allocations_per_frame"].is_null()) {
