@@ -1,5 +1,5 @@
 # Sourced by line.sh, quantization.sh and sharp.sh, in the checkout and with $folder set: tools.sh,
-# the body (with $body_options, if there are any), the motions, a person's capture.
+# the shipped person's body, the motions, a person's capture.
 #
 # People walk (four walks and an endless one from CMU 01_03) and jump (01_01), turned through 360
 # degrees. What is in $folder already stays.
@@ -8,6 +8,7 @@
 mkdir -p "$folder/runs"
 
 body=$folder/body.fgn
+body_options=(--atlas weighted --weight hands=5.5 --weight head=5.5)
 [ -e "$body" ] || { step "body"; train body --makehuman --uv 128 "${body_options[@]}" -o "$body"; }
 
 motions=()

@@ -20,7 +20,6 @@ cd "$figurine_checkout"
 
 folder=${1:-out/sharp} iterations=${ITERATIONS:-1000} minutes=${MINUTES:-10}
 programs=(figurine)
-body_options=(--atlas weighted --weight hands=5.5 --weight head=5.5)
 . scripts/experiments/people.sh
 
 other_body() {  # NAME OPTIONS...: another layout of texels over the same skeleton
