@@ -54,7 +54,8 @@ bool TileBins::prepare(uint32_t width_px, uint32_t height_px, size_t splats) {
   capacity_ = std::max(kMinPairs, kPairsPerSplat * splats);
   const size_t sections = pool_.threads();
   return pairs_.ensure(capacity_) && count_.ensure(tiles()) && begin_.ensure(tiles()) &&
-         section_count_.ensure(sections * tiles()) && section_missed_.ensure(sections);
+         section_count_.ensure(sections * tiles()) && found_.ensure(capacity_) &&
+         section_.ensure(sections);
 }
 
 uint32_t TileBins::first_of_section(uint32_t section) const {
@@ -72,20 +73,24 @@ void TileBins::for_each_tile(const kernels::Splat& splat, const Visit& visit) co
   }
 }
 
-uint64_t TileBins::count_section(uint32_t section) {
+void TileBins::count_section(uint32_t section) {
   uint32_t* counts = section_count_.data() + size_t{section} * tiles();
   std::memset(counts, 0, tiles() * sizeof(uint32_t));
+  Pair* const found = found_in(section);
+  const uint64_t limit = found_limit();
   uint64_t boxes = 0, pairs = 0;
   for (uint32_t i = first_of_section(section); i < first_of_section(section + 1); ++i) {
-    const kernels::Splat& splat = splats_[sorted_[i].index];
+    const uint32_t slot = sorted_[i].index;
+    const kernels::Splat& splat = splats_[slot];
     boxes += uint64_t(splat.tile_x_last - splat.tile_x_begin + 1) *
              uint64_t(splat.tile_y_last - splat.tile_y_begin + 1);
     for_each_tile(splat, [&](uint32_t tile) {
       ++counts[tile];
+      if (pairs < limit) found[pairs] = {slot, tile};
       ++pairs;
     });
   }
-  return boxes - pairs;
+  section_[section] = {.pairs = pairs, .missed = boxes - pairs};
 }
 
 void TileBins::count(const kernels::Splat* splats, const DepthSort::Item* sorted,
@@ -95,11 +100,9 @@ void TileBins::count(const kernels::Splat* splats, const DepthSort::Item* sorted
   sorted_count_ = sorted_count;
   exact_ = exact;
   sections_ = std::clamp(sorted_count / kSplatsPerSection, 1u, pool_.threads());
-  pool_.for_each(sections_, [&](size_t section) {
-    section_missed_[section] = count_section(static_cast<uint32_t>(section));
-  });
+  pool_.for_each(sections_, [&](size_t section) { count_section(static_cast<uint32_t>(section)); });
   pair_count_ = missed_ = 0;
-  for (uint32_t section = 0; section < sections_; ++section) missed_ += section_missed_[section];
+  for (uint32_t section = 0; section < sections_; ++section) missed_ += section_[section].missed;
   for (uint32_t tile = 0; tile < tiles(); ++tile) {
     count_[tile] = 0;
     for (uint32_t section = 0; section < sections_; ++section) {
@@ -129,17 +132,23 @@ TileBins::Band TileBins::fill_band(uint32_t begin) {
 
 void TileBins::fill_section(uint32_t section, const Band& band) {
   uint32_t* cursors = section_count_.data() + size_t{section} * tiles();
+  const auto add = [&](uint32_t slot, uint32_t tile) {
+    if (tile >= band.begin && tile < band.end) pairs_[cursors[tile]++] = slot;
+  };
+  if (const uint64_t pairs = section_[section].pairs; pairs <= found_limit()) {
+    const Pair* const found = found_in(section);
+    for (uint64_t i = 0; i < pairs; ++i) add(found[i].slot, found[i].tile);
+    return;
+  }
   for (uint32_t i = first_of_section(section); i < first_of_section(section + 1); ++i) {
     const uint32_t slot = sorted_[i].index;
-    for_each_tile(splats_[slot], [&](uint32_t tile) {
-      if (tile >= band.begin && tile < band.end) pairs_[cursors[tile]++] = slot;
-    });
+    for_each_tile(splats_[slot], [&](uint32_t tile) { add(slot, tile); });
   }
 }
 
 uint64_t TileBins::memory_bytes() const {
   return pairs_.memory_bytes() + count_.memory_bytes() + begin_.memory_bytes() +
-         section_count_.memory_bytes() + section_missed_.memory_bytes();
+         section_count_.memory_bytes() + found_.memory_bytes() + section_.memory_bytes();
 }
 
 }  // namespace figurine

@@ -1,8 +1,8 @@
 // Which splats a tile blends, front to back: a stable counting sort of (splat, tile) pairs by tile.
 //
 // Memory is bounded by the number of Gaussians and tiles alone. The pairs are not: where they do
-// not fit the list, the image is drawn in bands of tiles, each of which does. Nothing allocates
-// after prepare().
+// not fit the list, the image is drawn in bands of tiles, each of which does, and tiles are found
+// for every band anew; where they do, once. Nothing allocates after prepare().
 //
 // Sorted splats are divided into sections of equal length, one a task; each counts its own pairs a
 // tile, and a tile's pairs stand section by section, so the order is that of the sorted splats
@@ -47,8 +47,17 @@ class TileBins {
   uint64_t memory_bytes() const;
 
  private:
+  struct Pair {
+    uint32_t slot, tile;
+  };
+  struct Section {
+    uint64_t pairs, missed;
+  };
+
   uint32_t first_of_section(uint32_t section) const;
-  uint64_t count_section(uint32_t section);
+  Pair* found_in(uint32_t section) { return found_.data() + size_t{section} * found_limit(); }
+  size_t found_limit() const { return capacity_ / sections_; }  // of a section
+  void count_section(uint32_t section);
   void fill_section(uint32_t section, const Band& band);
   template <class Visit>
   void for_each_tile(const kernels::Splat& splat, const Visit& visit) const;
@@ -61,10 +70,11 @@ class TileBins {
   bool exact_ = true;
   uint64_t pair_count_ = 0, missed_ = 0;
   size_t capacity_ = 0;
-  Buffer<uint32_t> pairs_;           // splats' slots, tile by tile, front to back
-  Buffer<uint32_t> count_, begin_;   // [tiles] pairs, and where they stand within a band
-  Buffer<uint32_t> section_count_;   // [sections,tiles] pairs, then where the next one goes
-  Buffer<uint64_t> section_missed_;  // [sections]
+  Buffer<uint32_t> pairs_;          // splats' slots, tile by tile, front to back
+  Buffer<uint32_t> count_, begin_;  // [tiles] pairs, and where they stand within a band
+  Buffer<uint32_t> section_count_;  // [sections,tiles] pairs, then where the next one goes
+  Buffer<Pair> found_;              // [sections,found_limit()] while counting, splat by splat
+  Buffer<Section> section_;         // [sections]
 };
 
 }  // namespace figurine
