@@ -270,7 +270,7 @@ Status Renderer::render(const Frame& frame, const ImageTarget& target) {
   uint32_t blocks = 0;
   FIG_RETURN_IF_ERROR(impl.validate(frame, target, blocks));
   const kernels::View view = make_view(frame.camera, frame.splat.alpha_cut);
-  FIG_RETURN_IF_ERROR(impl.rasterizer.begin(view, frame.leave_out, blocks));
+  FIG_RETURN_IF_ERROR(impl.rasterizer.begin(view, frame.leave_out, frame.approximation, blocks));
 
   StageClock clock(impl.now_ns, impl.now_user);
   FrameStatistics statistics;

@@ -50,6 +50,9 @@ void add_options(CLI::App& app, Approximation& approximation) {
                  "network said of an earlier pose; 0: never")
       ->check(CLI::Range(0.0f, 65536.0f))
       ->capture_default_str();
+  app.add_flag("--fast-blend", approximation.fast_blend,
+               "blend by the fast tier: about 50 dB from the exact picture, and other last bits on "
+               "other CPUs");
 }
 
 Result<RendererOptions> DeviceOptions::renderer_options() const {

@@ -158,6 +158,7 @@ nlohmann::ordered_json describe(const BenchSubject& subject, const std::vector<B
                                                  : nlohmann::ordered_json(subject.scene.motions[0]);
   json["frames"] = subject.frames;
   json["network_below_px"] = subject.approximation.network_below_px;
+  json["fast_blend"] = subject.approximation.fast_blend;
   json["size"] = {lanes[0].size().width_px, lanes[0].size().height_px};
   return json;
 }

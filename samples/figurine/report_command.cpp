@@ -31,6 +31,7 @@ namespace {
 // What a setting may turn. A new kind of speed-up adds a member here and a row to dials().
 struct Knobs {
   SplatOptions splat;
+  Approximation approximation;
   std::optional<Precision> precision;  // without: the one that the report is made in
 };
 
@@ -71,7 +72,7 @@ Dial alpha_cut_dial() {
                 "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is "
                 "missing from the picture falls in proportion to the "
                 "cut.",
-            .reference = {.splat = {.alpha_cut = kReferenceCut}, .precision = {}},
+            .reference = {.splat = {.alpha_cut = kReferenceCut}, .approximation = {}, .precision = {}},
             .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve},
             .settings = {}};
   for (const int inverse : {16, 32, 64, 128, 255, 512, 1024, 4096, 16384}) {
@@ -80,7 +81,9 @@ Dial alpha_cut_dial() {
         {.label = "1/" + std::to_string(inverse),
          .value = cut,
          .is_default = static_cast<float>(cut) == kAlphaCut,
-         .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)}, .precision = {}}});
+         .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)},
+                   .approximation = {},
+                   .precision = {}}});
   }
   return dial;
 }
@@ -98,20 +101,47 @@ Dial precision_dial() {
           .theory =
               "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the "
               "layers add their errors up.",
-          .reference = {.splat = kSplat, .precision = Precision::kFloat32},
+          .reference = {.splat = kSplat, .approximation = {}, .precision = Precision::kFloat32},
           .stages = {Stage::kNetwork},
           .settings = {{.label = to_string(Precision::kFixedPoint),
                         .value = 0x1p-8,
                         .is_default = true,
-                        .knobs = {.splat = kSplat, .precision = Precision::kFixedPoint}},
+                        .knobs = {.splat = kSplat,
+                                  .approximation = {},
+                                  .precision = Precision::kFixedPoint}},
                        {.label = to_string(Precision::kFloat32),
                         .value = 0x1p-24,
                         .is_default = false,
-                        .knobs = {.splat = kSplat, .precision = Precision::kFloat32}}}};
+                        .knobs = {.splat = kSplat,
+                                  .approximation = {},
+                                  .precision = Precision::kFloat32}}}};
+}
+
+// At the default's alpha cut, which both tiers share: what is left of the difference is the tier's.
+Dial blend_dial() {
+  constexpr Approximation kFast{.fast_blend = true};
+  return {.name = "blend",
+          .meaning =
+              "arithmetic of the blend: exact, this dial's reference, or the fast tier; the value "
+              "is the light at which a pixel stops",
+          .theoretical_order = std::nullopt,
+          .theory =
+              "A pixel that stops at 1/255 of its light is at most that far from the truth; the "
+              "cubic in place of 2^x is 7.5e-5 off, relative.",
+          .reference = {.splat = {}, .approximation = {}, .precision = {}},
+          .stages = {Stage::kBlend},
+          .settings = {{.label = "fast",
+                        .value = 1.0 / 255,
+                        .is_default = false,
+                        .knobs = {.splat = {}, .approximation = kFast, .precision = {}}},
+                       {.label = "exact",
+                        .value = kTransmittanceStop,
+                        .is_default = true,
+                        .knobs = {.splat = {}, .approximation = {}, .precision = {}}}}};
 }
 
 std::vector<Dial> dials(bool both_precisions) {
-  std::vector<Dial> table = {alpha_cut_dial()};
+  std::vector<Dial> table = {alpha_cut_dial(), blend_dial()};
   if (both_precisions) table.push_back(precision_dial());
   return table;
 }
@@ -166,7 +196,8 @@ class SettingRenderer {
     return used.renderer->render({.camera = cameras_[i % cameras_.size()],
                                   .avatars = posed,
                                   .splat = knobs.splat,
-                                  .leave_out = {.unchanged_networks = false}},
+                                  .leave_out = {.unchanged_networks = false},
+                                  .approximation = knobs.approximation},
                                  picture.target());
   }
   Status measure(uint32_t i, const Setting& setting, const RenderedFrame& truth, RenderedFrame& u8,

@@ -142,7 +142,8 @@ void time_kernel(benchmark::State& state, kernels::ProjectBlock* kernel) {
   count_items(state, kBlocks * kLanes);
 }
 
-void time_kernel(benchmark::State& state, kernels::BlendTile* kernel) {
+template <class... Tier>
+void time_blend(benchmark::State& state, kernels::BlendedTile (*kernel)(const kernels::BlendTileJob&, Tier...)) {
   Random random(5);
   std::vector<kernels::Splat> splats(300);
   std::vector<uint32_t> order(splats.size());
@@ -162,11 +163,19 @@ void time_kernel(benchmark::State& state, kernels::BlendTile* kernel) {
                             .height = kernels::kTileSize,
                             .alpha_cut = 1.0f / 255,
                             .leave_out_stopped = 1,
-                            .pixels = pixels.get()})
+                            .pixels = pixels.get()},
+                           Tier{}...)
                         .contributions;
     benchmark::DoNotOptimize(pixels.get());
   }
   count_items(state, static_cast<double>(contributions));
+}
+
+void time_kernel(benchmark::State& state, kernels::BlendTile* kernel) {
+  time_blend(state, kernel);
+}
+void time_kernel(benchmark::State& state, kernels::BlendTileFast* kernel) {
+  time_blend(state, kernel);
 }
 
 void time_kernel(benchmark::State& state, kernels::ResolveRows* kernel) {

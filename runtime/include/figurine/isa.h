@@ -1,5 +1,5 @@
 // Instruction sets that kernels are written for. All of them give the same bits; they differ in
-// time alone.
+// time alone. The one exception is asked for (Approximation::fast_blend in frame.h).
 #pragma once
 
 #include <cstdint>

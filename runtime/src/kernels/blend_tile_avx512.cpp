@@ -6,12 +6,14 @@
 namespace figurine::kernels {
 namespace {
 
+#include "runtime/src/kernels/lanes_x86.inc"
+
 #include "runtime/src/kernels/lanes_avx512.inc"
 
 #include "runtime/src/kernels/blend_blocks.inc"
 
 }  // namespace
 
-BlendedTile blend_tile_avx512(const BlendTileJob& job) { return blend_tile_in_blocks(job); }
+BlendedTile blend_tile_avx512(const BlendTileJob& job) { return blend_tile_in_blocks<false>(job); }
 
 }  // namespace figurine::kernels

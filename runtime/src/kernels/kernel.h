@@ -197,6 +197,10 @@ struct BlendedTile {
 };
 // Clears the tile and blends its splats.
 using BlendTile = BlendedTile(const BlendTileJob& job);
+// The same by the fast tier (figurine/frame.h, Approximation): near the baseline, which is the exact
+// one, and not equal to it.
+struct FastTier {};
+using BlendTileFast = BlendedTile(const BlendTileJob& job, FastTier tier);
 
 enum ResolveFormat : uint32_t {
   kResolveRgba8,    // rounded to nearest and clamped to [0,1]; NaN is 0

@@ -6,6 +6,8 @@
 namespace figurine::kernels {
 namespace {
 
+#include "runtime/src/kernels/lanes_x86.inc"
+
 #include "runtime/src/kernels/lanes_avx2.inc"
 
 #include "runtime/src/kernels/projection_constants.inc"

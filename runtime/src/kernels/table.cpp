@@ -68,9 +68,9 @@ bool cpu_runs(Isa isa) {
 #endif
 #if defined(__x86_64__)
     case Isa::kSse41:
-      return __builtin_cpu_supports("sse4.1");
+      return __builtin_cpu_supports("sse4.1") && __builtin_cpu_supports("popcnt");
     case Isa::kAvx2:
-      return __builtin_cpu_supports("avx2");
+      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
     case Isa::kAvx512:
       return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
              __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");

@@ -15,6 +15,7 @@ struct KernelTable {
   kernels::DecodeSkin* decode_skin;
   kernels::ProjectBlock* project_block;
   kernels::BlendTile* blend_tile;
+  kernels::BlendTileFast* blend_tile_fast;
   kernels::ResolveRows* resolve_rows;
   kernels::AddDots* add_dots;
 };

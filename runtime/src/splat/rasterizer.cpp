@@ -22,9 +22,11 @@ void divide_time(uint64_t elapsed_ns, Stage first, uint64_t first_ns, Stage seco
 
 }  // namespace
 
-Status Rasterizer::begin(const kernels::View& view, const LeaveOut& leave_out, uint32_t blocks) {
+Status Rasterizer::begin(const kernels::View& view, const LeaveOut& leave_out,
+                         const Approximation& approximation, uint32_t blocks) {
   view_ = view;
   leave_out_ = leave_out;
+  approximation_ = approximation;
   slots_ = visible_ = 0;
   gaussians_ = transparent_ = outside_ = 0;
   blends_ = stopped_ = 0;
@@ -104,16 +106,18 @@ void Rasterizer::blend_tile(uint32_t index, const ImageTarget& target,
   kernels::BlendedTile blended{};
   const uint64_t begin_ns = clock.now();
   if (count != 0) {
-    blended = kernels_.blend_tile({.splats = splats_.data(),
-                                   .order = bins_.order(index),
-                                   .count = count,
-                                   .x = area.x,
-                                   .y = area.y,
-                                   .width = area.width,
-                                   .height = area.height,
-                                   .alpha_cut = view_.alpha_cut,
-                                   .leave_out_stopped = leave_out_.stopped ? 1u : 0u,
-                                   .pixels = &pixels});
+    const kernels::BlendTileJob job{.splats = splats_.data(),
+                                    .order = bins_.order(index),
+                                    .count = count,
+                                    .x = area.x,
+                                    .y = area.y,
+                                    .width = area.width,
+                                    .height = area.height,
+                                    .alpha_cut = view_.alpha_cut,
+                                    .leave_out_stopped = leave_out_.stopped ? 1u : 0u,
+                                    .pixels = &pixels};
+    blended = approximation_.fast_blend ? kernels_.blend_tile_fast(job, {})
+                                        : kernels_.blend_tile(job);
   }
   const uint64_t blended_ns = clock.now();
   resolve_tile(kernels_, area, count == 0 ? nullptr : &pixels, background, target);

@@ -33,7 +33,8 @@ class Rasterizer {
 
   // Starts a frame of at most so many blocks of Gaussians. The view is make_view's. Error:
   // kOutOfMemory.
-  Status begin(const kernels::View& view, const LeaveOut& leave_out, uint32_t blocks);
+  Status begin(const kernels::View& view, const LeaveOut& leave_out,
+               const Approximation& approximation, uint32_t blocks);
 
   // Gaussians that come in blocks.
   struct BlockSet {
@@ -86,6 +87,7 @@ class Rasterizer {
   const KernelTable& kernels_;
   kernels::View view_{};
   LeaveOut leave_out_;
+  Approximation approximation_;
 
   // One slot per lane of every block added, filled for the visible ones.
   uint32_t slots_ = 0, visible_ = 0;

@@ -424,6 +424,17 @@ TEST_F(Cli, SmallFiguresMayKeepWhatTheirNetworkSaid) {
   EXPECT_EQ(run("render P/avatar.fgn -o x.png --network-below-px -1").exit_code, 2);
 }
 
+TEST_F(Cli, TheFastBlendIsAskedForByName) {
+  const auto render = [&](const std::string& option) {
+    const ProgramRun result =
+        run("render P/avatar.fgn --size 64x64 --json -o x.png " + option);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return Json::parse(result.out);
+  };
+  EXPECT_EQ(render("")["fast_blend"], false);
+  EXPECT_EQ(render("--fast-blend")["fast_blend"], true);
+}
+
 TEST_F(Cli, BenchTakesSeveralFigures) {
   const auto bench = [&](const std::string& arguments) {
     const ProgramRun result = run("bench " + arguments + " --frames 3 --threads 1 --json -");
