@@ -197,8 +197,8 @@ struct BlendedTile {
 };
 // Clears the tile and blends its splats.
 using BlendTile = BlendedTile(const BlendTileJob& job);
-// The same by the fast tier (figurine/frame.h, Approximation): near the baseline, which is the exact
-// one, and not equal to it.
+// The same by the fast tier (figurine/frame.h, Approximation): near the baseline, which is the
+// exact one, and not equal to it.
 struct FastTier {};
 using BlendTileFast = BlendedTile(const BlendTileJob& job, FastTier tier);
 

@@ -116,8 +116,8 @@ void Rasterizer::blend_tile(uint32_t index, const ImageTarget& target,
                                     .alpha_cut = view_.alpha_cut,
                                     .leave_out_stopped = leave_out_.stopped ? 1u : 0u,
                                     .pixels = &pixels};
-    blended = approximation_.fast_blend ? kernels_.blend_tile_fast(job, {})
-                                        : kernels_.blend_tile(job);
+    blended =
+        approximation_.fast_blend ? kernels_.blend_tile_fast(job, {}) : kernels_.blend_tile(job);
   }
   const uint64_t blended_ns = clock.now();
   resolve_tile(kernels_, area, count == 0 ? nullptr : &pixels, background, target);

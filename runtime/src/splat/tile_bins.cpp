@@ -21,12 +21,17 @@ struct Columns {
 // Exact per row: the ellipse is widest within the row at its widest point clamped to the row,
 // because its extent is concave in y. Anything not comparable falls back to the box.
 Columns columns_of_row(const kernels::Splat& splat, uint32_t y) {
-  constexpr float kSlackPx = 0.01f, kSlackRatio = 1.0001f;
+  // Of rounding: of pixels, of half a width, of a row's place, which the slope multiplies, of sums
+  // of far places; and of what is left of the reach at the end of a needle, where it cancels.
+  constexpr float kSlackPx = 0.01f, kSlackRatio = 1.0001f, kSlackRows = 8e-6f, kSlackFar = 3e-7f,
+                  kReachRatio = 1.000001f;
+  const float slack_px =
+      kSlackPx + kSlackRows * std::fabs(splat.slope) + kSlackFar * std::fabs(splat.mean_x);
   const float top = (static_cast<float>(y * kTile) + 0.5f) - splat.mean_y,
               bottom = top + static_cast<float>(kTile - 1);
   const auto half_width = [&](float dy) {
-    const float v = dy * splat.scale_v, room = splat.reach - v * v;
-    return room > 0 ? std::sqrt(room) * splat.inverse_scale_u * kSlackRatio + kSlackPx : kSlackPx;
+    const float v = dy * splat.scale_v, room = kReachRatio * splat.reach - v * v;
+    return room > 0 ? std::sqrt(room) * splat.inverse_scale_u * kSlackRatio + slack_px : slack_px;
   };
   const float dy_right = std::min(std::max(splat.widest_dy_px, top), bottom),
               dy_left = std::min(std::max(-splat.widest_dy_px, top), bottom);

@@ -117,20 +117,27 @@ inline View make_view(Random& random) {
 }
 
 // As projection bounds it: no pixel beyond `reach` and `half_height` gets to an alpha of 1/255. The
-// ellipse is widest where x = slope dy + sqrt(reach - v^2) / scale_u is.
+// ellipse is widest where x = slope dy + sqrt(reach - v^2) / scale_u is; projection's slack lies
+// upon that, which puts a needle's widest point outside of it.
 inline void set_opacity(float opacity, Splat& splat) {
   splat.opacity = opacity;
   splat.reach = std::max(0.0f, std::log2(opacity * 255)) + 1e-3f;
   splat.half_height = std::sqrt(splat.reach) / splat.scale_v * 1.0001f + 1e-3f;
   const float skew = splat.slope * splat.scale_u / splat.scale_v;
-  splat.widest_dy_px = std::sqrt(splat.reach) * skew / std::sqrt(1 + skew * skew) / splat.scale_v;
+  splat.widest_dy_px =
+      1.0001f * std::sqrt(splat.reach) * skew / std::sqrt(1 + skew * skew) / splat.scale_v;
 }
 
+// Every ninth is a needle that lies nearly along a row.
 inline Splat make_splat(Random& random) {
-  const float scale_u = random.uniform(0.02f, 1.2f), scale_v = random.uniform(0.02f, 1.2f);
+  const bool needle = below(random, 9) == 0;
+  const float scale_u = random.uniform(0.02f, 1.2f),
+              scale_v = random.uniform(needle ? 0.8f : 0.02f, 1.2f);
   Splat splat{.mean_x = random.uniform(-20, 90),
               .mean_y = random.uniform(-20, 90),
-              .slope = random.uniform(-2, 2),
+              .slope = needle
+                           ? std::exp(random.uniform(0, 8)) * (below(random, 2) == 0 ? 1.0f : -1.0f)
+                           : random.uniform(-2, 2),
               .scale_u = scale_u,
               .scale_v = scale_v,
               .inverse_scale_u = 1 / scale_u,
@@ -146,6 +153,8 @@ inline Splat make_splat(Random& random) {
               .tile_x_last = 2,
               .tile_y_last = 2};
   set_opacity(random.uniform(0.005f, 1.2f), splat);
+  if (needle)  // with its end, where bounds cancel, in reach of the tiles
+    splat.mean_x = random.uniform(-5, 75) - splat.slope * splat.widest_dy_px;
   return splat;
 }
 
@@ -352,8 +361,8 @@ inline void compare(BlendTile* a, BlendTile* b) {
 }
 
 // Near, not equal: a pixel may stop at 1/255 of its light, and then has the contribution that took
-// it there, for which up to 1/100 was left; what lies at the cut may be on either side of it. Colours
-// here reach 2.
+// it there, for which up to 1/100 was left; what lies at the cut may be on either side of it.
+// Colours here reach 2.
 inline void compare(BlendTileFast* a, BlendTileFast* b) {
   Random random(5);
   double squares = 0, values = 0;

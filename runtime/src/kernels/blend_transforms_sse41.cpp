@@ -1,0 +1,13 @@
+// blend_transforms.inc in SSE4.1.
+#include "runtime/src/kernels/kernel.h"
+
+namespace figurine::kernels {
+namespace {
+
+#include "runtime/src/kernels/blend_transforms.inc"
+
+}  // namespace
+
+void blend_transforms_sse41(const BlendTransformsJob& job) { blend_transforms(job); }
+
+}  // namespace figurine::kernels

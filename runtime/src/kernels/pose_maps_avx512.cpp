@@ -1,0 +1,13 @@
+// pose_maps.inc in vectors of sixteen lanes.
+#include "runtime/src/kernels/kernel.h"
+
+namespace figurine::kernels {
+namespace {
+
+#include "runtime/src/kernels/pose_maps.inc"
+
+}  // namespace
+
+void pose_maps_avx512(const PoseMapsJob& job) { pose_maps(job); }
+
+}  // namespace figurine::kernels
