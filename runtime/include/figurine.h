@@ -342,7 +342,8 @@ typedef enum fig_leave_out {
   FIG_LEAVE_OUT_OUTSIDE = 4,       /* Gaussians that touch no pixel */
   FIG_LEAVE_OUT_MISSED_TILES = 8,  /* tiles of a Gaussian's box that its ellipse does not reach */
   FIG_LEAVE_OUT_STOPPED = 16,      /* what lies behind a tile that is opaque */
-  FIG_LEAVE_OUT_ALL = 31,
+  FIG_LEAVE_OUT_UNCHANGED_NETWORKS = 32, /* runs for the pose of the last run */
+  FIG_LEAVE_OUT_ALL = 63,
   FIG_LEAVE_OUT_MAX_ENUM = 0x7fffffff
 } fig_leave_out;
 
@@ -366,6 +367,9 @@ typedef struct fig_frame {
   float alpha_cut;             /* contributions below it are skipped; in (0, 0.5]; 1/255 */
   uint32_t leave_out;          /* bits of fig_leave_out; FIG_LEAVE_OUT_ALL */
   fig_antialiased antialiased; /* FIG_ANTIALIASED_AS_TRAINED */
+  /* What a frame may leave out although it shows (figurine/frame.h, Approximation). */
+  float network_below_px; /* smaller figures keep what their network said of an earlier pose; 0 */
+  uint32_t fast_blend;    /* 1: the blend's fast tier, about 50 dB from the exact picture; 0 */
 } fig_frame;
 FIG_DEFAULT(frame)
 

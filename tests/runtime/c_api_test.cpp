@@ -240,6 +240,13 @@ TEST_F(CApi, SwitchesAndFormatsArriveWhereTheyBelong) {
   EXPECT_OK(fig_renderer_render(timed, &frame, &image));
   EXPECT_NE(pixels, red);
   frame.antialiased = FIG_ANTIALIASED_AS_TRAINED;
+  frame.fast_blend = 1, frame.network_below_px = 1;  // no figure is that small
+  EXPECT_OK(fig_renderer_render(timed, &frame, &image));
+  int largest = 0;
+  for (size_t i = 0; i < red.size(); ++i)
+    largest = std::max(largest, std::abs(int{pixels[i]} - int{red[i]}));
+  EXPECT_LE(largest, 8) << "near the exact picture";
+  frame.fast_blend = 0, frame.network_below_px = 0;
   frame.alpha_cut = 0.4f;
   EXPECT_OK(fig_renderer_render(timed, &frame, &image));
   EXPECT_NE(pixels, red);
@@ -677,9 +684,13 @@ TEST_F(CApi, UnsoundValuesAreRefused) {
   EXPECT_REFUSED(fig_renderer_pose_avatar(renderer, person, &pose, &posed), FIG_INVALID_ARGUMENT,
                  "pose: ");
   pose.joint_count = 4;
-  frame.leave_out = 32;
+  frame.leave_out = 64;
   EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "leave_out");
-  frame.leave_out = FIG_LEAVE_OUT_ALL, frame.alpha_cut = 0;
+  frame.leave_out = FIG_LEAVE_OUT_ALL, frame.fast_blend = 2;
+  EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "fast_blend");
+  frame.fast_blend = 0, frame.network_below_px = -1;
+  EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "network_below_px");
+  frame.network_below_px = 0, frame.alpha_cut = 0;
   EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "alpha cut");
   frame.alpha_cut = 0.01f, frame.antialiased = static_cast<fig_antialiased>(3);
   EXPECT_REFUSED(render(), FIG_INVALID_ARGUMENT, "frame: unknown antialiased 3");

@@ -183,7 +183,8 @@ Result<LeaveOut> leave_out_of(uint32_t bits) {
                   .transparent = has(FIG_LEAVE_OUT_TRANSPARENT),
                   .outside = has(FIG_LEAVE_OUT_OUTSIDE),
                   .missed_tiles = has(FIG_LEAVE_OUT_MISSED_TILES),
-                  .stopped = has(FIG_LEAVE_OUT_STOPPED)};
+                  .stopped = has(FIG_LEAVE_OUT_STOPPED),
+                  .unchanged_networks = has(FIG_LEAVE_OUT_UNCHANGED_NETWORKS)};
 }
 
 Result<std::optional<bool>> antialiased_of(fig_antialiased given) {
@@ -208,13 +209,16 @@ Result<Frame> frame_of(const fig_frame* given, fig_renderer renderer, RendererOb
   if (!leave_out.ok()) return leave_out.status();
   const Result<std::optional<bool>> antialiased = antialiased_of(read.antialiased);
   if (!antialiased.ok()) return antialiased.status();
+  if (read.fast_blend > 1) return invalid("frame: fast_blend: neither 0 nor 1");
   FIG_RETURN_IF_ERROR(read_arrays(read, renderer, object));
   Frame frame{.camera = *camera,
               .avatars = object.seen,
               .gaussians = object.gaussians,
               .background = std::nullopt,
               .splat = {.alpha_cut = read.alpha_cut, .antialiased = *antialiased},
-              .leave_out = *leave_out};
+              .leave_out = *leave_out,
+              .approximation = {.network_below_px = read.network_below_px,
+                                .fast_blend = read.fast_blend != 0}};
   if (const float* const rgb = read.background; rgb != nullptr)
     frame.background = std::array<float, 3>{rgb[0], rgb[1], rgb[2]};
   return frame;
