@@ -63,27 +63,27 @@ constexpr const char* kReferenceMeaning =
     "everywhere.";
 
 Dial alpha_cut_dial() {
-  Dial dial{.name = "alpha cut",
-            .meaning =
-                "contributions to a pixel with an alpha below this are skipped; it decides how far "
-                "around its centre a Gaussian is drawn",
-            .theoretical_order = 1,
-            .theory =
-                "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is "
-                "missing from the picture falls in proportion to the "
-                "cut.",
-            .reference = {.splat = {.alpha_cut = kReferenceCut}, .approximation = {}, .precision = {}},
-            .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve},
-            .settings = {}};
+  Dial dial{
+      .name = "alpha cut",
+      .meaning =
+          "contributions to a pixel with an alpha below this are skipped; it decides how far "
+          "around its centre a Gaussian is drawn",
+      .theoretical_order = 1,
+      .theory =
+          "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is "
+          "missing from the picture falls in proportion to the "
+          "cut.",
+      .reference = {.splat = {.alpha_cut = kReferenceCut}, .approximation = {}, .precision = {}},
+      .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve},
+      .settings = {}};
   for (const int inverse : {16, 32, 64, 128, 255, 512, 1024, 4096, 16384}) {
     const double cut = 1.0 / inverse;
-    dial.settings.push_back(
-        {.label = "1/" + std::to_string(inverse),
-         .value = cut,
-         .is_default = static_cast<float>(cut) == kAlphaCut,
-         .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)},
-                   .approximation = {},
-                   .precision = {}}});
+    dial.settings.push_back({.label = "1/" + std::to_string(inverse),
+                             .value = cut,
+                             .is_default = static_cast<float>(cut) == kAlphaCut,
+                             .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)},
+                                       .approximation = {},
+                                       .precision = {}}});
   }
   return dial;
 }
@@ -92,32 +92,30 @@ Dial alpha_cut_dial() {
 // difference is the precision's own.
 Dial precision_dial() {
   constexpr SplatOptions kSplat{.alpha_cut = kReferenceCut};
-  return {.name = "precision",
-          .meaning =
-              "arithmetic of the network: q8 (int8 weights and activations) or f32, this dial's "
-              "reference; the value is the step of a "
-              "number that fills its range",
-          .theoretical_order = std::nullopt,
-          .theory =
-              "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the "
-              "layers add their errors up.",
-          .reference = {.splat = kSplat, .approximation = {}, .precision = Precision::kFloat32},
-          .stages = {Stage::kNetwork},
-          .settings = {{.label = to_string(Precision::kFixedPoint),
-                        .value = 0x1p-8,
-                        .is_default = true,
-                        .knobs = {.splat = kSplat,
-                                  .approximation = {},
-                                  .precision = Precision::kFixedPoint}},
-                       {.label = to_string(Precision::kFloat32),
-                        .value = 0x1p-24,
-                        .is_default = false,
-                        .knobs = {.splat = kSplat,
-                                  .approximation = {},
-                                  .precision = Precision::kFloat32}}}};
+  return {
+      .name = "precision",
+      .meaning =
+          "arithmetic of the network: q8 (int8 weights and activations) or f32, this dial's "
+          "reference; the value is the step of a "
+          "number that fills its range",
+      .theoretical_order = std::nullopt,
+      .theory =
+          "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the "
+          "layers add their errors up.",
+      .reference = {.splat = kSplat, .approximation = {}, .precision = Precision::kFloat32},
+      .stages = {Stage::kNetwork},
+      .settings = {
+          {.label = to_string(Precision::kFixedPoint),
+           .value = 0x1p-8,
+           .is_default = true,
+           .knobs = {.splat = kSplat, .approximation = {}, .precision = Precision::kFixedPoint}},
+          {.label = to_string(Precision::kFloat32),
+           .value = 0x1p-24,
+           .is_default = false,
+           .knobs = {.splat = kSplat, .approximation = {}, .precision = Precision::kFloat32}}}};
 }
 
-// At the default's alpha cut, which both tiers share: what is left of the difference is the tier's.
+// At the default's alpha cut: what is left of the difference is the tier's.
 Dial blend_dial() {
   constexpr Approximation kFast{.fast_blend = true};
   return {.name = "blend",

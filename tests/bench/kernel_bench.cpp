@@ -143,7 +143,8 @@ void time_kernel(benchmark::State& state, kernels::ProjectBlock* kernel) {
 }
 
 template <class... Tier>
-void time_blend(benchmark::State& state, kernels::BlendedTile (*kernel)(const kernels::BlendTileJob&, Tier...)) {
+void time_blend(benchmark::State& state,
+                kernels::BlendedTile (*kernel)(const kernels::BlendTileJob&, Tier...)) {
   Random random(5);
   std::vector<kernels::Splat> splats(300);
   std::vector<uint32_t> order(splats.size());
@@ -171,9 +172,7 @@ void time_blend(benchmark::State& state, kernels::BlendedTile (*kernel)(const ke
   count_items(state, static_cast<double>(contributions));
 }
 
-void time_kernel(benchmark::State& state, kernels::BlendTile* kernel) {
-  time_blend(state, kernel);
-}
+void time_kernel(benchmark::State& state, kernels::BlendTile* kernel) { time_blend(state, kernel); }
 void time_kernel(benchmark::State& state, kernels::BlendTileFast* kernel) {
   time_blend(state, kernel);
 }

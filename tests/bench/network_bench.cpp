@@ -68,6 +68,7 @@ void run_fixed_point(benchmark::State& state, bool drawn_alone) {
                 &runner->input()[size_t{texel} * runner->input_stride()]);
   }
   for (auto _ : state) FIG_CHECK(runner->run().ok(), "the network runs");
+  state.counters["macs"] = static_cast<double>(runner->macs());
 }
 
 void run_dynamic(benchmark::State& state) {
@@ -88,10 +89,19 @@ void sizes(benchmark::internal::Benchmark* benchmark) {
       ->UseRealTime();
 }
 
+// What a side and channels cost (docs/results/network_cost.json).
+void prices(benchmark::internal::Benchmark* benchmark) {
+  for (const int64_t size : {32, 64, 128, 256}) {
+    for (const int64_t channels : {16, 24, 32, 48, 64}) benchmark->Args({size, channels, 1});
+  }
+  benchmark->Unit(benchmark::kMillisecond)->UseRealTime();
+}
+
 BENCHMARK(run_float)->Name("f32")->Apply(sizes);
 BENCHMARK_CAPTURE(run_fixed_point, all, false)->Name("qs8")->Apply(sizes);
 BENCHMARK_CAPTURE(run_fixed_point, drawn, true)->Name("qs8 drawn")->Apply(sizes);
 BENCHMARK(run_dynamic)->Name("qd8")->Apply(sizes);
+BENCHMARK_CAPTURE(run_fixed_point, price, true)->Name("price")->Apply(prices);
 
 }  // namespace
 }  // namespace figurine

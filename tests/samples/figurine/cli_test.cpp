@@ -426,8 +426,7 @@ TEST_F(Cli, SmallFiguresMayKeepWhatTheirNetworkSaid) {
 
 TEST_F(Cli, TheFastBlendIsAskedForByName) {
   const auto render = [&](const std::string& option) {
-    const ProgramRun result =
-        run("render P/avatar.fgn --size 64x64 --json -o x.png " + option);
+    const ProgramRun result = run("render P/avatar.fgn --size 64x64 --json -o x.png " + option);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return Json::parse(result.out);
   };
@@ -501,8 +500,12 @@ TEST_F(Cli, ReportHasADialOfPrecisionsWhereThereAreTwo) {
   const ProgramRun result = run("report P/both.fgn --motion P/motion.fgn --frames 2 --json -o r");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json json = Json::parse(result.out);
-  ASSERT_EQ(json["dials"].size(), 2u);
-  const Json& settings = json["dials"][1]["settings"];
+  ASSERT_EQ(json["dials"].size(), 3u);
+  const Json& tiers = json["dials"][1]["settings"];
+  EXPECT_EQ(tiers[0]["label"], "fast");
+  EXPECT_GT(tiers[0]["psnr_db"], 40);
+  EXPECT_TRUE(tiers[1]["psnr_db"].is_null()) << "the exact blend is the reference";
+  const Json& settings = json["dials"][2]["settings"];
   ASSERT_EQ(settings.size(), 2u);
   EXPECT_EQ(settings[0]["label"], "q8");
   EXPECT_GT(settings[0]["psnr_db"], 20);
@@ -511,7 +514,7 @@ TEST_F(Cli, ReportHasADialOfPrecisionsWhereThereAreTwo) {
   EXPECT_NE(folder_.read("r/report.html").find("Precision"), std::string::npos);
   EXPECT_EQ(json["machine"]["precision"], "q8");
   ASSERT_EQ(run("report P/both.fgn --precision q8 --frames 1 -o r").exit_code, 0);
-  EXPECT_EQ(Json::parse(folder_.read("r/report.json"))["dials"].size(), 1u);
+  EXPECT_EQ(Json::parse(folder_.read("r/report.json"))["dials"].size(), 2u);
 }
 
 TEST_F(Cli, EveryCommandTakesAPrecision) {
