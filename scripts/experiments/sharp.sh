@@ -59,8 +59,7 @@ row() {
 
 # Trained by the clock, on all cores. The preset before: no static values, a network for all texels
 # where the mesh's own layout has them.
-filters_off="--smallest-extent off --antialiased off"
-before="--static-grids none --network-size 128 --learning-rate 2e-3 $filters_off"
+before="--static-grids none --network-size 128 --learning-rate 2e-3 --antialiased off"
 fast=(--minutes "$minutes" --poses 2 --views-per-pose 2)
 timed="
 shipped|$person|body|
@@ -96,9 +95,8 @@ network_32|body|--network-size 32
 channels_24|body|--channels 24
 channels_16|body|--channels 16
 mesh_layout|body_mesh_layout|
-no_smallest_extent|body|--smallest-extent off
+smallest_extent|body|--smallest-extent on
 not_antialiased|body|--antialiased off
-no_filters|body|$filters_off
 sh_degree_1|body|--sh-degree 1
 perceptual|body|--perceptual samples/populations/edge_features.safetensors --perceptual-weight 0.02
 "

@@ -74,7 +74,7 @@ TrainSettings preset_settings(const std::string& name) {
   if (preset.network_step > 1) settings.network_size = preset.uv_size / preset.network_step;
   settings.schedule.peak = preset.learning_rate;
   settings.static_grids = parse_static_grids(preset.static_grids, name);
-  settings.smallest_extent = settings.antialiased = preset.filters;
+  settings.antialiased = preset.antialiased;
   return settings;
 }
 

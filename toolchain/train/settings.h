@@ -23,7 +23,7 @@ struct Preset {
   uint32_t network_step;     // T / T_n
   double learning_rate;      // of the network
   const char* static_grids;  // as parse_static_grids reads it
-  bool filters;              // smallest extents, and antialiased
+  bool antialiased;          // splats, in training and ever after
 };
 
 inline constexpr std::array<Preset, 4> kPresets{
@@ -134,7 +134,7 @@ void check_parts(const TrainSettings& settings, const std::string& where);
 
 // What a preset says of itself, all else as above.
 TrainSettings preset_settings(const std::string& name);
-// The same with a network for all texels, no static values and no filters: what a population's
+// The same with a network for all texels, no static values and not antialiased: what a population's
 // members are.
 TrainSettings network_alone(TrainSettings settings);
 

@@ -142,7 +142,7 @@ TEST_F(RunDirectoryTest, PresetsSayWhatTheyAre) {
   EXPECT_EQ(to_json(edge).at("static_grids"), "all:T");
   EXPECT_EQ(to_json(edge).at("network_size"), 64);
   EXPECT_EQ(texel_side(edge), 128u);
-  EXPECT_TRUE(edge.smallest_extent && edge.antialiased);
+  EXPECT_TRUE(edge.antialiased && !edge.smallest_extent);
   // The paper to the letter.
   EXPECT_FALSE(to_json(paper).contains("static_grids"));
   EXPECT_FALSE(paper.smallest_extent || paper.antialiased);
