@@ -369,7 +369,7 @@ typedef struct fig_frame {
   fig_antialiased antialiased; /* FIG_ANTIALIASED_AS_TRAINED */
   /* What a frame may leave out although it shows (figurine/frame.h, Approximation). */
   float network_below_px; /* smaller figures keep what their network said of an earlier pose; 0 */
-  uint32_t fast_blend;    /* 1: the blend's fast tier, about 50 dB from the exact picture; 0 */
+  uint32_t fast_blend;    /* 1: the blend's fast tier, over 50 dB from the exact picture; 0 */
 } fig_frame;
 FIG_DEFAULT(frame)
 

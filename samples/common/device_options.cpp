@@ -51,7 +51,7 @@ void add_options(CLI::App& app, Approximation& approximation) {
       ->check(CLI::Range(0.0f, 65536.0f))
       ->capture_default_str();
   app.add_flag("--fast-blend", approximation.fast_blend,
-               "blend by the fast tier: about 50 dB from the exact picture, and other last bits on "
+               "blend by the fast tier: over 50 dB from the exact picture, and other last bits on "
                "other CPUs");
 }
 

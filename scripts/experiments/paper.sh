@@ -7,7 +7,7 @@
 # FOLDER (default out/paper) keeps every step: run it again and it goes on where it stopped.
 #
 # Environment: MINUTES (60) of each training, FRAMES (60) of the capture, SEED (1) of the person. On
-# two quiet cores an hour and a quarter.
+# two quiet cores an hour and a quarter by estimate.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"

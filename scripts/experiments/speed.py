@@ -7,7 +7,7 @@ that it ships (512x512, its golden pose swaying: a fresh pose and a run of the n
 both the same person of capsules (scripts/experiments/capsule.py, 1024x1024, seen once). All cases
 take turns, ROUNDS times. Writes the medians over rounds of each run's medians to OUTPUT
 (docs/results/speed.json), prints them, and holds the pictures of the capsules against each other;
-some five minutes on idle CPUs. FIGURINE_BIND=FOLDER shows scripts/run a checkout elsewhere.
+about a minute and a half on idle CPUs. FIGURINE_BIND=FOLDER shows scripts/run a checkout elsewhere.
 
 What XNNPACK runs does not depend on --isa, which limits figurine's own kernels: every row has its
 time without the network beside it.
@@ -27,7 +27,6 @@ import results
 
 ROUNDS = 5
 FRAMES = 60
-CROWD = 64  # figures of 60 pixels, side by side, each in a pose and a place of its own
 FIGURINE = "build/release/samples/figurine/figurine"
 PERSON = "samples/packages/person.fgn"
 
@@ -65,14 +64,6 @@ def capsules(checkout, scene, picture, *options):
     return {"p50_ms": total}, stages, report["machine"]["cpu"]
 
 
-def crowd(checkout, *options):
-    command = ["bench", *[PERSON] * CROWD, "--size", "2048x72", "--frames", 10]
-    report = run(checkout, *command, "--precision", "q8", "--threads", 1, *options)
-    (lane,) = [lane for lane in report["runs"] if lane["threads"] == 1]
-    stages = {stage: times["median"] for stage, times in lane["stages_ms"].items()}
-    return {"p50_ms": stages["total"]}, stages, report["machine"]["cpu"]
-
-
 def supported_isas(checkout):
     """Those of this CPU, the baseline first."""
     isas = ["baseline", "neon", "sse41", "avx2", "avx512"]
@@ -107,7 +98,6 @@ def cases(before, after, folder):
         table["capsules", "after", isa, 1, "exact"] = (
             lambda i=isa, o=out: capsules(after, scene, o, "--isa", i)
         )
-    table["crowd", "after", "", 1, "exact"] = lambda: crowd(after)
     return table
 
 
@@ -155,7 +145,6 @@ def summary_of(rows):
     same = {"scene": "person", "build": "after", "isa": best, "tier": "exact"}
     one, two = time_of(rows, threads=1, **same), time_of(rows, threads=2, **same)
     summary["two_core_scaling"] = ratio(one, two)
-    summary["crowd_over_one"] = ratio(time_of(rows, scene="crowd"), one)
     (first,) = [
         row["first_frame_ms"]
         for row in rows

@@ -185,6 +185,28 @@ TEST_P(LeaveOutScene, SmallFiguresMayKeepWhatTheirNetworkSaid) {
   }
 }
 
+TEST_P(LeaveOutScene, TheFastBlendIsNearTheExactOne) {
+  const GaussianView cloud = cloud_.view();
+  for (const Isa isa : supported_isas()) {
+    const std::unique_ptr<Renderer> renderer =
+        std::move(Renderer::create({.threads = 1, .isa = isa})).value();
+    const auto draw_blend = [&](bool fast) {
+      Frame frame{.camera = camera_, .gaussians = {&cloud, 1}};
+      frame.approximation.fast_blend = fast;
+      return tests::render(*renderer, frame).rgba;
+    };
+    const std::vector<float> exact = draw_blend(false), fast = draw_blend(true);
+    EXPECT_EQ(fast == exact, isa == Isa::kBaseline) << to_string(isa);
+    double squares = 0;
+    for (size_t i = 0; i < exact.size(); i += 4) {  // premultiplied red
+      const double difference = double(exact[i] * exact[i + 3]) - double(fast[i] * fast[i + 3]);
+      squares += difference * difference;
+    }
+    EXPECT_LE(squares, 1e-5 * static_cast<double>(exact.size() / 4)) << to_string(isa);
+    EXPECT_EQ(draw_blend(false), exact);
+  }
+}
+
 TEST_P(LeaveOutScene, AnyThreadsAndInstructionSetGiveTheSamePicture) {
   const Drawn truth = draw({}, 1, Isa::kBaseline);
   for (const Isa isa : supported_isas()) {

@@ -74,7 +74,7 @@ struct Approximation {
   float network_below_px = 0;
   // The fast tier of the blend: products added without rounding them first, 2^x by a cubic, and a
   // pixel stops at 1/255 of its light, after the contribution that took it there, in place of
-  // 1/10,000 before it. About 50 dB from the exact picture (docs/numerics.md, "Splatting"), and
+  // 1/10,000 before it. Over 50 dB from the exact picture (docs/numerics.md, "Splatting"), and
   // other last bits on other instruction sets.
   bool fast_blend = false;
 };

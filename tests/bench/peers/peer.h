@@ -37,8 +37,9 @@ struct Peer {
   std::vector<Pair> pairs;           // of draw_by_rows
 };
 
-// Gaussian after Gaussian, nearest first, over every pixel of the box of three deviations, as
-// OpenSplat's rasterizer for CPUs does.
+// Gaussian after Gaussian, nearest first, over every pixel of a box of three deviations, after the
+// forward loop of OpenSplat's rasterizer for CPUs; without the lists that its gradients need, and
+// the box is that of the widest direction both ways.
 void draw_by_gaussian(const GaussianView& gaussians, const Camera& camera, Peer& peer);
 
 // Tiles of 16 x 16 pixels, (tile, depth) pairs sorted together, a row of 16 pixels at a time: the
