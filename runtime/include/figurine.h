@@ -319,6 +319,7 @@ typedef struct fig_frame_avatar {
   size_t struct_bytes;
   fig_avatar avatar;
   const fig_pose* pose;
+  fig_avatar coarse; /* the same person in less detail, for when it is small; {0}: none */
 } fig_frame_avatar;
 FIG_DEFAULT(frame_avatar)
 
@@ -370,6 +371,10 @@ typedef struct fig_frame {
   /* What a frame may leave out although it shows (figurine/frame.h, Approximation). */
   float network_below_px; /* smaller figures keep what their network said of an earlier pose; 0 */
   uint32_t fast_blend;    /* 1: the blend's fast tier, over 50 dB from the exact picture; 0 */
+  uint32_t network_interval; /* networks run for one of so many poses, and go on in between; 1 */
+  float coarse_below_px;     /* smaller figures are drawn by fig_frame_avatar::coarse; 0 */
+  float averted_above;       /* cosine above which texels facing away are left out; 1 */
+  uint32_t sh_degree;        /* bands of spherical harmonics above it are left out; 3 */
 } fig_frame;
 FIG_DEFAULT(frame)
 

@@ -38,6 +38,20 @@ Status validate_gaussians(const GaussianView& gaussians, size_t index) {
   return {};
 }
 
+Status validate_approximation(const Approximation& approximation) {
+  const auto is_size = [](float px) { return px >= 0 && std::isfinite(px); };
+  if (!is_size(approximation.network_below_px))
+    return invalid("network_below_px: must be finite and not negative");
+  if (approximation.network_interval == 0) return invalid("network_interval: must be at least 1");
+  if (!is_size(approximation.coarse_below_px))
+    return invalid("coarse_below_px: must be finite and not negative");
+  if (!(approximation.averted_above >= 0 && approximation.averted_above <= 1))
+    return invalid("averted_above: must be in [0, 1]");
+  if (approximation.sh_degree > kMaxShDegree)
+    return invalid("sh_degree: is above " + std::to_string(kMaxShDegree));
+  return {};
+}
+
 }  // namespace
 
 const char* network_library() { return "XNNPACK " FIGURINE_XNNPACK_VERSION; }
@@ -65,6 +79,7 @@ struct Renderer::Impl {
 
   // Fails, or says how many blocks of Gaussians the frame has at most.
   Status validate(const Frame& frame, const ImageTarget& target, uint32_t& blocks) const;
+  Status validate_seen(const FrameAvatar& seen) const;
   Status validate_avatar(AvatarId id, const PoseView& pose) const;
   Result<std::shared_ptr<SharedBody>> blocks_of(const Body& body) const;
   Status add(const FrameAvatar& seen, const kernels::View& view, const Frame& frame,
@@ -74,6 +89,8 @@ struct Renderer::Impl {
 
   std::vector<AddedAvatar>::const_iterator find(AvatarId id) const;  // end() if there is none
   PosedAvatar& avatar(AvatarId id) const { return *find(id)->posed; }
+  // The avatar itself, or the one for when it is small.
+  AvatarId choose_detail(const FrameAvatar& seen, const kernels::View& view, const Frame& frame);
 
   std::shared_ptr<ThreadPool> pool;
   uint64_t (*now_ns)(void* user);
@@ -97,9 +114,7 @@ Status Renderer::Impl::validate(const Frame& frame, const ImageTarget& target,
   }
   if (!(frame.splat.alpha_cut > 0 && frame.splat.alpha_cut <= 0.5f))
     return invalid("alpha cut: must be above 0 and at most 0.5");
-  const float below_px = frame.approximation.network_below_px;
-  if (!(below_px >= 0) || !std::isfinite(below_px))
-    return invalid("network_below_px: must be finite and not negative");
+  FIG_RETURN_IF_ERROR(validate_approximation(frame.approximation));
   if (frame.background) {
     for (float channel : *frame.background) {
       if (!std::isfinite(channel)) return invalid("background: must be finite");
@@ -107,10 +122,13 @@ Status Renderer::Impl::validate(const Frame& frame, const ImageTarget& target,
   }
   uint64_t gaussian_count = 0, all_blocks = 0;
   for (size_t i = 0; i < frame.avatars.size(); ++i) {
-    const Status valid = validate_avatar(frame.avatars[i].avatar, frame.avatars[i].pose);
+    const FrameAvatar& seen = frame.avatars[i];
+    const Status valid = validate_seen(seen);
     if (!valid.ok()) return valid.within("avatars[" + std::to_string(i) + "]");
-    gaussian_count += avatar(frame.avatars[i].avatar).body().texel_count();
-    all_blocks += avatar(frame.avatars[i].avatar).block_count();
+    const PosedAvatar &fine = avatar(seen.avatar),
+                      &coarse = avatar(seen.coarse.value_or(seen.avatar));
+    gaussian_count += std::max(fine.body().texel_count(), coarse.body().texel_count());
+    all_blocks += std::max(fine.block_count(), coarse.block_count());
   }
   for (size_t i = 0; i < frame.gaussians.size(); ++i) {
     FIG_RETURN_IF_ERROR(validate_gaussians(frame.gaussians[i], i));
@@ -124,6 +142,11 @@ Status Renderer::Impl::validate(const Frame& frame, const ImageTarget& target,
   }
   blocks = static_cast<uint32_t>(all_blocks);
   return {};
+}
+
+Status Renderer::Impl::validate_seen(const FrameAvatar& seen) const {
+  FIG_RETURN_IF_ERROR(validate_avatar(seen.avatar, seen.pose));
+  return seen.coarse ? validate_avatar(*seen.coarse, seen.pose).within("coarse") : Status();
 }
 
 Status Renderer::Impl::validate_avatar(AvatarId id, const PoseView& pose) const {
@@ -157,11 +180,21 @@ std::shared_ptr<const BodyGrid> Renderer::Impl::grid_of(const SharedBody& body,
   return nullptr;
 }
 
+AvatarId Renderer::Impl::choose_detail(const FrameAvatar& seen, const kernels::View& view,
+                                       const Frame& frame) {
+  const float below_px = frame.approximation.coarse_below_px;
+  if (!seen.coarse || below_px == 0) return seen.avatar;
+  const bool small = avatar(seen.avatar).is_smaller(seen.pose, view, below_px, scratch);
+  return small ? *seen.coarse : seen.avatar;
+}
+
 Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view, const Frame& frame,
                            StageClock& clock, FrameStatistics& of_frame) {
-  PosedAvatar& posed = avatar(seen.avatar);
+  const AvatarId shown = choose_detail(seen, view, frame);
+  PosedAvatar& posed = avatar(shown);
+  const uint32_t sh_degree = std::min(posed.sh_degree(), frame.approximation.sh_degree);
   const Result<NetworkUse> use = posed.pose({.pose = seen.pose,
-                                             .avatar = seen.avatar,
+                                             .avatar = shown,
                                              .view = &view,
                                              .leave_out = frame.leave_out,
                                              .approximation = frame.approximation},
@@ -169,22 +202,18 @@ Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view, c
   if (!use.ok()) return use.status();
   const std::span<const uint32_t> wanted = scratch.wanted_blocks();
   rasterizer.add({.blocks = static_cast<uint32_t>(wanted.size()),
-                  .sh_degree = posed.sh_degree(),
+                  .sh_degree = sh_degree,
                   .antialiased = frame.splat.antialiased.value_or(posed.antialiased()),
                   .fill_stage = Stage::kDecode},
                  clock, [&](uint32_t i, kernels::GaussianBlock& block) {
-                   return posed.decode(scratch, wanted[i], block);
+                   return posed.decode(scratch, wanted[i], sh_degree, block);
                  });
-  for (uint32_t i = 0, next = 0; i < posed.block_count(); ++i) {
-    if (next < wanted.size() && wanted[next] == i) {
-      ++next;
-    } else {
-      of_frame.left_out.hidden_texels += lanes_of_block(i, posed.body().texel_count());
-    }
-  }
+  of_frame.left_out.hidden_texels += scratch.hidden_texels;
+  of_frame.averted_texels += scratch.averted_texels;
+  of_frame.coarse_avatars += shown != seen.avatar ? 1 : 0;
   of_frame.macs += *use == NetworkUse::kRun ? posed.macs() : 0;
   of_frame.networks += *use == NetworkUse::kRun ? 1 : 0;
-  of_frame.stale_networks += *use == NetworkUse::kStale ? 1 : 0;
+  of_frame.stale_networks += *use == NetworkUse::kStale || *use == NetworkUse::kContinued ? 1 : 0;
   of_frame.left_out.unchanged_networks += *use == NetworkUse::kUnchanged ? 1 : 0;
   return {};
 }
@@ -299,7 +328,7 @@ Result<GaussianView> Renderer::pose_avatar(AvatarId id, const PoseView& pose) {
   if (!use.ok()) return use.status();
   kernels::GaussianBlock block;
   for (uint32_t i = 0; i < posed.block_count(); ++i) {
-    const uint32_t lanes = posed.decode(impl_->scratch, i, block);
+    const uint32_t lanes = posed.decode(impl_->scratch, i, posed.sh_degree(), block);
     impl_->gaussians.store(block, i, lanes, posed.sh_degree());
   }
   return impl_->gaussians.view(count, posed.sh_degree());

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -13,6 +14,19 @@
 namespace figurine::samples {
 
 namespace {
+
+struct OmissionName {
+  const char* name;
+  bool LeaveOut::* member;
+};
+constexpr OmissionName kOmissions[] = {
+    {"hidden-texels", &LeaveOut::hidden_texels},
+    {"transparent", &LeaveOut::transparent},
+    {"outside", &LeaveOut::outside},
+    {"missed-tiles", &LeaveOut::missed_tiles},
+    {"stopped", &LeaveOut::stopped},
+    {"unchanged-networks", &LeaveOut::unchanged_networks},
+};
 
 // Those of this build and this CPU, the largest last.
 std::string isa_names() {
@@ -44,15 +58,70 @@ void DeviceOptions::add_to(CLI::App& app, bool json_flag) {
   if (json_flag) app.add_flag("--json", json, "print a summary as JSON to standard output");
 }
 
-void add_options(CLI::App& app, Approximation& approximation) {
+void OmissionOptions::add_to(CLI::App& app) {
+  Approximation& approximation = asked;
+  app.add_option("--network-hz", network_hz,
+                 "run each network so many times a second of the frames' own rate; in between its "
+                 "outputs go on in a straight line; 0: at every frame")
+      ->check(CLI::Range(0.0f, 1000.0f))
+      ->capture_default_str();
   app.add_option("--network-below-px", approximation.network_below_px,
                  "figures whose box in the image is smaller than this many pixels keep what their "
                  "network said of an earlier pose; 0: never")
       ->check(CLI::Range(0.0f, 65536.0f))
       ->capture_default_str();
+  app.add_option("--coarse-below-px", approximation.coarse_below_px,
+                 "figures smaller than this in the image are drawn by their --coarse; 0: never")
+      ->check(CLI::Range(0.0f, 65536.0f))
+      ->capture_default_str();
+  app.add_option("--averted-above", approximation.averted_above,
+                 "leave out what faces away from the camera: cosine between line of sight and "
+                 "surface; 1: nothing")
+      ->check(CLI::Range(0.0f, 1.0f))
+      ->capture_default_str();
+  app.add_option("--sh-degree", approximation.sh_degree,
+                 "leave out spherical harmonics above this degree")
+      ->check(CLI::Range(0u, kMaxShDegree))
+      ->capture_default_str();
   app.add_flag("--fast-blend", approximation.fast_blend,
                "blend by the fast tier: over 50 dB from the exact picture, and other last bits on "
                "other CPUs");
+  std::vector<std::string> names;
+  for (const OmissionName& omission : kOmissions) names.push_back(omission.name);
+  app.add_option(
+         "--keep", kept,
+         "compute what changes no pixel and would be left out, to see what that is worth: " +
+             CLI::detail::join(names, ", "))
+      ->expected(1)
+      ->take_all()
+      ->check(CLI::IsMember(names));
+}
+
+LeaveOut OmissionOptions::leave_out() const {
+  LeaveOut leave_out;
+  for (const OmissionName& omission : kOmissions) {
+    if (std::find(kept.begin(), kept.end(), omission.name) != kept.end())
+      leave_out.*omission.member = false;
+  }
+  return leave_out;
+}
+
+Approximation OmissionOptions::approximation(double frames_per_second) const {
+  Approximation approximation = asked;
+  if (network_hz > 0) {
+    approximation.network_interval =
+        static_cast<uint32_t>(std::clamp(std::round(frames_per_second / network_hz), 1.0, 1e6));
+  }
+  return approximation;
+}
+
+void add_json(const Approximation& approximation, nlohmann::ordered_json& json) {
+  json["network_below_px"] = approximation.network_below_px;
+  json["network_interval"] = approximation.network_interval;
+  json["coarse_below_px"] = approximation.coarse_below_px;
+  json["averted_above"] = approximation.averted_above;
+  json["sh_degree"] = approximation.sh_degree;
+  json["fast_blend"] = approximation.fast_blend;
 }
 
 Result<RendererOptions> DeviceOptions::renderer_options() const {

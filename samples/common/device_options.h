@@ -6,6 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "figurine/renderer.h"
 #include "figurine/status.h"
@@ -39,8 +40,19 @@ void add_isa_option(CLI::App& app, std::string& isa);
 // the same bits with every one. kUnsupported for what is not there.
 Result<Isa> instruction_set(const std::string& isa);
 
-// What a command may leave out although it shows.
-void add_options(CLI::App& app, Approximation& approximation);
+// What a command leaves out, exactly or although it shows.
+struct OmissionOptions {
+  Approximation asked;
+  float network_hz = 0;           // 0: asked.network_interval as it is
+  std::vector<std::string> kept;  // names of LeaveOut's switches that are off
+
+  void add_to(CLI::App& app);
+  // For frames that follow each other at this rate.
+  Approximation approximation(double frames_per_second) const;
+  LeaveOut leave_out() const;
+};
+// Its fields in a --json output.
+void add_json(const Approximation& approximation, nlohmann::ordered_json& json);
 
 // Renderer::create, with a line on standard error where the system gives fewer threads than asked
 // for.

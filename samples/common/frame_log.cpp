@@ -36,6 +36,8 @@ void FrameLog::add(const FrameStatistics& statistics, uint64_t total_ns) {
   networks_ += statistics.networks;
   unchanged_networks_ += statistics.left_out.unchanged_networks;
   stale_networks_ += statistics.stale_networks;
+  coarse_avatars_ += statistics.coarse_avatars;
+  averted_texels_ += statistics.averted_texels;
 }
 
 uint64_t FrameLog::missed_60hz() const {
@@ -78,7 +80,9 @@ nlohmann::ordered_json FrameLog::work_json() const {
           {"macs", count(macs_)},
           {"networks", per_frame(networks_)},
           {"unchanged_networks", per_frame(unchanged_networks_)},
-          {"stale_networks", per_frame(stale_networks_)}};
+          {"stale_networks", per_frame(stale_networks_)},
+          {"coarse_avatars", per_frame(coarse_avatars_)},
+          {"averted_texels", per_frame(averted_texels_)}};
 }
 
 }  // namespace figurine::samples

@@ -38,7 +38,8 @@ class FrameLog {
   std::vector<double> total_ms_;
   std::vector<double> stage_ms_[kStageCount];
   std::vector<double> gaussians_, visible_, pairs_, blends_, macs_;
-  uint64_t networks_ = 0, unchanged_networks_ = 0, stale_networks_ = 0;
+  uint64_t networks_ = 0, unchanged_networks_ = 0, stale_networks_ = 0, coarse_avatars_ = 0,
+           averted_texels_ = 0;
 };
 
 }  // namespace figurine::samples

@@ -1,5 +1,6 @@
 #include "samples/common/scene.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -33,40 +34,123 @@ Result<std::unique_ptr<LoadedPackage>> load_motion(const std::vector<std::string
   return motion;
 }
 
-// Side by side about the middle, unless places are given.
+// Side by side about the middle, unless places are given; a crowd in rows and columns, heading by
+// the golden angle, which repeats nothing.
 Result<Placement> place_of(const SceneOptions& options, size_t index) {
   if (!options.places.empty()) return parse_placement(options.places[index]);
-  const auto last = static_cast<float>(options.avatars.size() - 1);
-  return Placement{.x_m = options.spacing_m * (static_cast<float>(index) - 0.5f * last)};
+  const size_t count = options.avatars.size() * options.crowd;
+  const auto from_middle = [&](size_t at, size_t places) {
+    return options.spacing_m * (static_cast<float>(at) - 0.5f * static_cast<float>(places - 1));
+  };
+  if (options.crowd == 1) return Placement{.x_m = from_middle(index, count)};
+  constexpr float kGoldenAngle_deg = 137.50776f;
+  const auto columns = static_cast<size_t>(std::ceil(std::sqrt(static_cast<double>(count))));
+  return Placement{
+      .x_m = from_middle(index % columns, columns),
+      .z_m = from_middle(index / columns, (count + columns - 1) / columns),
+      .heading_deg = std::remainder(kGoldenAngle_deg * static_cast<float>(index), 360.0f)};
+}
+
+Status check_counts(const SceneOptions& options) {
+  const size_t count = options.avatars.size();
+  const auto check = [&](const char* option, size_t given, bool one_for_all) {
+    if (given == 0 || given == count || (one_for_all && given == 1)) return Status();
+    return Status(StatusCode::kInvalidArgument,
+                  std::string(option) + ": give one " + (one_for_all ? "for all or one " : "") +
+                      "for each of the " + std::to_string(count) + " avatars");
+  };
+  FIG_RETURN_IF_ERROR(check("motion", options.motions.size(), true));
+  FIG_RETURN_IF_ERROR(check("coarse", options.coarse.size(), true));
+  if (options.crowd > 1 && !options.places.empty())
+    return Status(StatusCode::kInvalidArgument, "place: a crowd finds its own");
+  return check("place", options.places.size(), false);
+}
+
+// The body of an avatar: one in memory, however many wear it.
+template <class Figures>
+Result<std::shared_ptr<LoadedPackage>> body_of(const LoadedAvatar& avatar, const std::string& named,
+                                               const Figures& others) {
+  for (const auto& other : others) {
+    for (const std::shared_ptr<LoadedPackage>& body : {other.body, other.coarse_body}) {
+      if (named.empty() && body && body->package.content_hash() == avatar.avatar.body_hash)
+        return body;
+    }
+  }
+  Result<std::unique_ptr<LoadedPackage>> body = find_body(avatar, named);
+  if (!body.ok()) return body.status();
+  return std::shared_ptr<LoadedPackage>(std::move(*body));
 }
 
 }  // namespace
 
+void add_crowd_options(CLI::App& app, SceneOptions& options) {
+  app.add_option("--coarse", options.coarse,
+                 "avatar packages of the same people in less detail, one for all or one for each: "
+                 "what small figures are drawn by (--coarse-below-px)")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--crowd", options.crowd,
+                 "so many of every avatar, in rows and columns, each at a moment of its own")
+      ->check(CLI::Range(1u, 1024u))
+      ->capture_default_str();
+}
+
 PoseView Scene::Figure::recorded_pose(uint32_t frame) const {
-  if (motion) return motion->package.motion().pose(frame);
+  if (motion) {
+    const Motion& clip = motion->package.motion();
+    return clip.pose((frame + ahead_frames) % clip.frame_count);
+  }
   const GoldenFrame& golden = avatar->avatar.golden;
   return {golden.root_translation_m, golden.rotations};
+}
+
+Status Scene::load_packages(const SceneOptions& options, size_t index,
+                            std::span<const Figure> others, Figure& figure) {
+  Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.avatars[index]);
+  if (!avatar.ok()) return avatar.status();
+  figure.avatar = std::move(*avatar);
+  Result<std::shared_ptr<LoadedPackage>> body = body_of(*figure.avatar, options.body, others);
+  if (!body.ok()) return body.status();
+  figure.body = std::move(*body);
+  Result<std::unique_ptr<LoadedPackage>> motion = load_motion(options.motions, index, *figure.body);
+  if (!motion.ok()) return motion.status();
+  figure.motion = std::move(*motion);
+  return load_coarse(options, index, others, figure);
+}
+
+Status Scene::load_coarse(const SceneOptions& options, size_t index, std::span<const Figure> others,
+                          Figure& figure) {
+  if (options.coarse.empty()) return {};
+  Result<std::unique_ptr<LoadedAvatar>> coarse =
+      load_avatar(options.coarse[options.coarse.size() == 1 ? 0 : index]);
+  if (!coarse.ok()) return coarse.status();
+  figure.coarse = std::move(*coarse);
+  Result<std::shared_ptr<LoadedPackage>> body = body_of(*figure.coarse, "", std::span(&figure, 1));
+  if (body.ok() && *body != figure.body) body = body_of(*figure.coarse, "", others);
+  if (!body.ok()) return body.status();
+  figure.coarse_body = std::move(*body);
+  if (figure.coarse_body->package.body().joint_count() !=
+      figure.body->package.body().joint_count()) {
+    return Status(
+        StatusCode::kInvalidArgument,
+        figure.coarse->name + ": its body's joints are not " + figure.avatar->name + "'s");
+  }
+  return {};
 }
 
 Result<Scene::Figure> Scene::load_figure(const SceneOptions& options, size_t index,
                                          std::span<const Figure> others) {
   Figure figure;
-  Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.avatars[index]);
-  if (!avatar.ok()) return avatar.status();
-  figure.avatar = std::move(*avatar);
-  for (const Figure& other : others) {  // one body in memory, however many wear it
-    if (options.body.empty() &&
-        other.body->package.content_hash() == figure.avatar->avatar.body_hash)
-      figure.body = other.body;
+  if (index < options.avatars.size()) {
+    FIG_RETURN_IF_ERROR(load_packages(options, index, others, figure));
+  } else {
+    const Figure& first = others[index % options.avatars.size()];
+    figure.avatar = first.avatar, figure.coarse = first.coarse;
+    figure.body = first.body, figure.coarse_body = first.coarse_body;
+    figure.motion = first.motion;
   }
-  if (!figure.body) {
-    Result<std::unique_ptr<LoadedPackage>> body = find_body(*figure.avatar, options.body);
-    if (!body.ok()) return body.status();
-    figure.body = std::move(*body);
-  }
-  Result<std::unique_ptr<LoadedPackage>> motion = load_motion(options.motions, index, *figure.body);
-  if (!motion.ok()) return motion.status();
-  figure.motion = std::move(*motion);
+  constexpr uint32_t kAhead_frames = 29;  // about a second, and no part of a usual loop's length
+  figure.ahead_frames = options.crowd > 1 ? kAhead_frames * static_cast<uint32_t>(index) : 0;
   const Result<Placement> place = place_of(options, index);
   if (!place.ok()) return place.status();
   figure.place = *place;
@@ -83,15 +167,8 @@ Result<Scene::Figure> Scene::load_figure(const SceneOptions& options, size_t ind
 }
 
 Result<Scene> Scene::load(const SceneOptions& options) {
-  const size_t count = options.avatars.size();
-  if (options.motions.size() > 1 && options.motions.size() != count) {
-    return Status(StatusCode::kInvalidArgument, "motion: give one for all or one for each of the " +
-                                                    std::to_string(count) + " avatars");
-  }
-  if (!options.places.empty() && options.places.size() != count) {
-    return Status(StatusCode::kInvalidArgument,
-                  "place: give one for each of the " + std::to_string(count) + " avatars");
-  }
+  FIG_RETURN_IF_ERROR(check_counts(options));
+  const size_t count = options.avatars.size() * options.crowd;
   Scene scene;
   for (size_t i = 0; i < count; ++i) {
     Result<Figure> figure = load_figure(options, i, scene.figures_);
@@ -129,6 +206,11 @@ Status Scene::add_to(Renderer& renderer, std::optional<Precision> precision) {
         renderer.add_avatar(figures_[i].avatar->avatar, figures_[i].body->package, precision);
     if (!id.ok()) return id.status().within(figures_[i].avatar->name);
     posed_[i].avatar = *id;
+    if (!figures_[i].coarse) continue;
+    const Result<AvatarId> coarse =
+        renderer.add_avatar(figures_[i].coarse->avatar, figures_[i].coarse_body->package);
+    if (!coarse.ok()) return coarse.status().within(figures_[i].coarse->name);
+    posed_[i].coarse = *coarse;
   }
   return {};
 }
@@ -153,7 +235,8 @@ std::span<const FrameAvatar> Scene::pose(uint32_t frame) {
 
 std::span<const FrameAvatar> Scene::sway(uint32_t moment) {
   for (size_t i = 0; i < figures_.size(); ++i)
-    place_figure(i, *figures_[i].swaying->next(moment / SwayPoses::kMomentsPerSecond));
+    place_figure(i, *figures_[i].swaying->next((moment + figures_[i].ahead_frames) /
+                                               SwayPoses::kMomentsPerSecond));
   return posed_;
 }
 

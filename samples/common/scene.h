@@ -14,15 +14,25 @@
 #include "samples/common/parse.h"
 #include "samples/common/pose_source.h"
 
+namespace CLI {
+class App;
+}
+
 namespace figurine::samples {
 
 struct SceneOptions {
   std::vector<std::string> avatars;
+  std::vector<std::string> coarse;   // FrameAvatar::coarse: none, one for all, or one for each
   std::string body;                  // empty: found by content hash
   std::vector<std::string> motions;  // none: the golden pose; one for all, or one for each avatar
   float spacing_m = 0.9f;            // between neighbours side by side, where no places are given
   std::vector<std::string> places;   // "X,Z[,HEADING]" for each avatar, or none
+  // Above 1: so many of every avatar in rows and columns, looking everywhere, each at a moment of
+  // its own of what they do.
+  uint32_t crowd = 1;
 };
+// --coarse and --crowd.
+void add_crowd_options(CLI::App& app, SceneOptions& options);
 
 class Scene {
  public:
@@ -66,9 +76,10 @@ class Scene {
 
  private:
   struct Figure {
-    std::shared_ptr<LoadedAvatar> avatar;
-    std::shared_ptr<LoadedPackage> body, motion;
+    std::shared_ptr<LoadedAvatar> avatar, coarse;
+    std::shared_ptr<LoadedPackage> body, coarse_body, motion;
     Placement place;
+    uint32_t ahead_frames = 0;         // of the scene
     std::vector<float> rest_joints_m;  // [J,3] of the template that the Gaussians sit on
     std::unique_ptr<PoseSource> source, swaying;
     std::vector<float> rotations;  // [J,4] of the last pose
@@ -79,6 +90,10 @@ class Scene {
   };
   static Result<Figure> load_figure(const SceneOptions& options, size_t index,
                                     std::span<const Figure> others);
+  static Status load_packages(const SceneOptions& options, size_t index,
+                              std::span<const Figure> others, Figure& figure);
+  static Status load_coarse(const SceneOptions& options, size_t index,
+                            std::span<const Figure> others, Figure& figure);
   void place_figure(size_t figure, const PoseView& pose);
 
   std::vector<Figure> figures_;

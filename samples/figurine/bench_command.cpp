@@ -28,7 +28,7 @@ constexpr uint32_t kWarmUpFrames = 3;
 struct BenchOptions {
   BenchSubject subject;
   DeviceOptions device;
-  std::string size, json, framing = "body";
+  std::string size, json, camera, framing = "body";
 };
 
 // What is asked for; otherwise all that every avatar holds, the renderer's own choice first; that
@@ -141,6 +141,13 @@ Result<BenchSubject> subject_of(const BenchOptions& options) {
   const Result<Framing> framing = parse_framing(options.framing);
   if (!framing.ok()) return framing.status();
   subject.framing = *framing;
+  if (!options.camera.empty()) {
+    const Result<CameraSpec> camera = parse_camera_spec(options.camera);
+    if (!camera.ok()) return camera.status();
+    if (!subject.ply.empty())
+      return Status(StatusCode::kInvalidArgument, subject.ply + ": is turned, without --camera");
+    subject.camera = *camera;
+  }
   return subject;
 }
 
@@ -157,8 +164,8 @@ nlohmann::ordered_json describe(const BenchSubject& subject, const std::vector<B
   json["motion"] = subject.scene.motions.empty() ? nlohmann::ordered_json()
                                                  : nlohmann::ordered_json(subject.scene.motions[0]);
   json["frames"] = subject.frames;
-  json["network_below_px"] = subject.approximation.network_below_px;
-  json["fast_blend"] = subject.approximation.fast_blend;
+  json["figures"] = lanes[0].figures() ? lanes[0].figures()->size() : 0;
+  add_json(lanes[0].approximation(), json);
   json["size"] = {lanes[0].size().width_px, lanes[0].size().height_px};
   return json;
 }
@@ -250,6 +257,12 @@ Command add_bench_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--size", options->size,
                       "WIDTHxHEIGHT; default: the golden frame's, or 1024x768");
+  add_crowd_options(*command, subject.scene);
+  command->add_option("--camera", options->camera,
+                      "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
+  command->add_option("--spacing", subject.scene.spacing_m, "metres between figures")
+      ->check(CLI::Range(-1000.0f, 1000.0f))
+      ->capture_default_str();
   command->add_option("--framing", options->framing, "body, bust or head")
       ->check(CLI::IsMember({"body", "bust", "head"}))
       ->capture_default_str();
@@ -257,7 +270,7 @@ Command add_bench_command(CLI::App& app) {
       ->check(CLI::IsMember(kUpAxes))
       ->capture_default_str();
   options->device.add_to(*command, false);
-  add_options(*command, subject.approximation);
+  subject.omissions.add_to(*command);
   command->add_option("--json", options->json,
                       "write the figures to this file; - prints them instead of the table");
   return {command, [options] { return run_bench(*options); }};

@@ -27,6 +27,8 @@ Status BenchLane::open_figures(const BenchSubject& subject, const RendererOption
   if (!scene.ok()) return scene.status();
   scene_ = std::make_unique<Scene>(std::move(*scene));
   first.open_ms = ms_since(start_ns);
+  if (scene_->moves())
+    approximation_ = subject.omissions.approximation(scene_->frames_per_second());
   start_ns = ports::now_ns();
   Result<std::unique_ptr<Renderer>> renderer = make_renderer(options);
   if (!renderer.ok()) return renderer.status();
@@ -45,6 +47,7 @@ Status BenchLane::open_figures(const BenchSubject& subject, const RendererOption
   frames_ = std::move(*frames);
   if (frames_.size() > subject.frames) frames_.resize(subject.frames);
   CameraPathOptions path;
+  path.camera = subject.camera;
   path.size = subject.size;
   path.framing = subject.framing;
   Result<std::vector<Camera>> cameras = make_camera_path(path, frames_, *scene_, *renderer_);
@@ -89,7 +92,9 @@ Result<BenchLane> BenchLane::open(const BenchSubject& subject, RendererOptions r
                                   std::optional<Precision> precision, FirstFrame& first) {
   BenchLane lane;
   lane.precision_ = precision;
-  lane.approximation_ = subject.approximation;
+  lane.leave_out_ = subject.omissions.leave_out();
+  lane.leave_out_.unchanged_networks = false;  // a pose that comes again has its run all the same
+  lane.approximation_ = subject.omissions.approximation(SwayPoses::kMomentsPerSecond);
   FIG_RETURN_IF_ERROR(subject.ply.empty() ? lane.open_figures(subject, renderer, first)
                                           : lane.open_gaussians(subject, renderer, first));
   return lane;
@@ -101,11 +106,10 @@ Status BenchLane::render(uint32_t i, RenderedFrame& frame, bool measured) {
   const std::span<const GaussianView> gaussians(&view, cloud_ ? 1 : 0);
   if (measured) start_counting_allocations();
   const uint64_t start_ns = ports::now_ns();
-  // A pose that comes again has its run all the same.
   const Status status = renderer_->render({.camera = cameras_[i % cameras_.size()],
                                            .avatars = posed,
                                            .gaussians = gaussians,
-                                           .leave_out = {.unchanged_networks = false},
+                                           .leave_out = leave_out_,
                                            .approximation = approximation_},
                                           frame.target());
   const uint64_t total_ns = ports::now_ns() - start_ns;

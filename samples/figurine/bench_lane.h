@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "samples/common/camera_spec.h"
+#include "samples/common/device_options.h"
 #include "samples/common/frame_log.h"
 #include "samples/common/framing.h"
 #include "samples/common/rendered_frame.h"
@@ -23,7 +25,8 @@ struct BenchSubject {
   std::string up = "+y";
   std::optional<ImageSize> size;  // else the golden frame's; kSceneSize of Gaussians
   Framing framing = Framing::kBody;
-  Approximation approximation;
+  CameraSpec camera;  // of figures
+  OmissionOptions omissions;
   uint32_t frames = 60;  // after which cameras and poses begin anew
 };
 
@@ -39,6 +42,7 @@ class BenchLane {
 
   ImageSize size() const { return {cameras_[0].width_px, cameras_[0].height_px}; }
   const Scene* figures() const { return scene_.get(); }  // null of Gaussians
+  const Approximation& approximation() const { return approximation_; }
   Status render(uint32_t i, RenderedFrame& frame, bool measured);
   // An entry of "runs" (docs/json.md).
   nlohmann::ordered_json json() const;
@@ -58,6 +62,7 @@ class BenchLane {
   std::unique_ptr<GaussianCloud> cloud_;
   std::vector<uint32_t> frames_;
   std::vector<Camera> cameras_;
+  LeaveOut leave_out_;
   Approximation approximation_;
   FrameLog log_;
   uint64_t allocations_ = 0;

@@ -22,7 +22,7 @@ namespace {
 struct RenderOptions {
   SceneOptions scene;
   DeviceOptions device;
-  Approximation approximation;
+  OmissionOptions omissions;
   std::string frames, camera, size, background, follow = "smooth", framing = "body";
   std::optional<float> near_m;
   std::optional<double> frames_per_second;
@@ -129,6 +129,7 @@ Status run_render(const RenderOptions& options) {
     }
   }
 
+  const Approximation approximation = options.omissions.approximation(job->frames_per_second);
   RenderedFrame frame(size, sink ? sink->format() : PixelFormat::kRgba8);
   FrameLog log;
   Progress progress("render", frame_count);
@@ -139,7 +140,8 @@ Status run_render(const RenderOptions& options) {
     FIG_RETURN_IF_ERROR((*renderer)->render({.camera = (*cameras)[i],
                                              .avatars = job->scene.pose(job->frames[i]),
                                              .background = job->background,
-                                             .approximation = options.approximation},
+                                             .leave_out = options.omissions.leave_out(),
+                                             .approximation = approximation},
                                             frame.target()));
     log.add((*renderer)->statistics(), ports::now_ns() - frame_start_ns);
     if (sink) FIG_RETURN_IF_ERROR(sink->add(frame));
@@ -161,8 +163,7 @@ Status run_render(const RenderOptions& options) {
     json["frames_per_second"] =
         1000 / std::max(log.total_ms().median, 1e-6);  // of rendering, by the median frame
     json["frames_per_second_with_output"] = frame_count / std::max(wall_s, 1e-9);
-    json["network_below_px"] = options.approximation.network_below_px;
-    json["fast_blend"] = options.approximation.fast_blend;
+    add_json(approximation, json);
     json["stages_ms"] = log.stages_json();
     json["work"] = log.work_json();
     json["renderer_memory_bytes"] = (*renderer)->memory_bytes();
@@ -202,6 +203,7 @@ Command add_render_command(CLI::App& app) {
   command->add_option("--spacing", options->scene.spacing_m, "metres between avatars side by side")
       ->check(CLI::Range(-1000.0f, 1000.0f))
       ->capture_default_str();
+  add_crowd_options(*command, options->scene);
   command->add_option("--camera", options->camera,
                       "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
   command
@@ -242,7 +244,7 @@ Command add_render_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("-o,--output", options->output, "x.png, x_%04d.png, x.pfm, x.y4m or x.mp4");
   options->device.add_to(*command);
-  add_options(*command, options->approximation);
+  options->omissions.add_to(*command);
   return {command, [options] { return run_render(*options); }};
 }
 

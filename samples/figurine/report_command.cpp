@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <format>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -138,8 +139,56 @@ Dial blend_dial() {
                         .knobs = {.splat = {}, .approximation = {}, .precision = {}}}}};
 }
 
-std::vector<Dial> dials(bool both_precisions) {
-  std::vector<Dial> table = {alpha_cut_dial(), blend_dial()};
+// The value is the part of the averted half sphere of directions that is left out.
+Dial averted_dial() {
+  Dial dial{.name = "averted texels",
+            .meaning =
+                "texels are left out, sixteen at a time, whose surface faces away from the camera: "
+                "where the cosine between line of sight and normal is above a bound; the value is "
+                "1 less it",
+            .theoretical_order = std::nullopt,
+            .theory =
+                "A closed surface hides what faces away. What the bound has to allow for is that a "
+                "Gaussian is a disc of some size, seen around the silhouette, and that hair and "
+                "hems are no closed surface.",
+            .reference = {.splat = {}, .approximation = {}, .precision = {}},
+            .stages = {Stage::kSkin, Stage::kDecode, Stage::kProject, Stage::kSort, Stage::kBin,
+                       Stage::kBlend},
+            .settings = {}};
+  for (const float above : {0.0f, 0.1f, 0.25f, 0.5f, 0.75f, 1.0f}) {
+    dial.settings.push_back(
+        {.label = above < 1 ? std::format("{}", above) : "none",
+         .value = 1.0 - double{above},
+         .is_default = above == 1,
+         .knobs = {.splat = {}, .approximation = {.averted_above = above}, .precision = {}}});
+  }
+  return dial;
+}
+
+// Of avatars that have bands above the constant one.
+Dial sh_degree_dial(uint32_t degree) {
+  Dial dial{.name = "SH degree",
+            .meaning =
+                "bands of spherical harmonics above this degree are left out; the value is the "
+                "number of coefficients that stay",
+            .theoretical_order = std::nullopt,
+            .theory = "A band of degree d holds what changes d times around the figure.",
+            .reference = {.splat = {}, .approximation = {}, .precision = {}},
+            .stages = {Stage::kDecode, Stage::kProject},
+            .settings = {}};
+  for (uint32_t d = 0; d <= degree; ++d) {
+    dial.settings.push_back(
+        {.label = std::to_string(d),
+         .value = static_cast<double>(sh_coefficients(d)),
+         .is_default = d == degree,
+         .knobs = {.splat = {}, .approximation = {.sh_degree = d}, .precision = {}}});
+  }
+  return dial;
+}
+
+std::vector<Dial> dials(bool both_precisions, uint32_t sh_degree) {
+  std::vector<Dial> table = {alpha_cut_dial(), blend_dial(), averted_dial()};
+  if (sh_degree > 0) table.push_back(sh_degree_dial(sh_degree));
   if (both_precisions) table.push_back(precision_dial());
   return table;
 }
@@ -364,6 +413,9 @@ Status run_report(const ReportOptions& options) {
       both ? make_scene_renderer(options.scene, *renderer_options, Precision::kFloat32)
            : SceneRenderer{};
   if (!floats.ok()) return floats.status();
+  uint32_t sh_degree = 0;
+  for (size_t i = 0; i < scene.size(); ++i)
+    sh_degree = std::max(sh_degree, scene.avatar(i).avatar.decoding.sh_degree);
   // Evenly over the whole motion.
   const Result<std::vector<uint32_t>> all = scene.frames({});
   if (!all.ok()) return all.status();
@@ -379,7 +431,7 @@ Status run_report(const ReportOptions& options) {
   SettingRenderer drawing(std::move(*first), std::move(*floats), std::move(frames),
                           std::move(*cameras));
 
-  const std::vector<Dial> table = dials(both);
+  const std::vector<Dial> table = dials(both, sh_degree);
   std::vector<std::vector<Measurement>> measurements;
   for (const Dial& dial : table) measurements.emplace_back(dial.settings.size());
   RenderedFrame truth(drawing.size(), PixelFormat::kRgbaF32),

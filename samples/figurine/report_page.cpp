@@ -96,9 +96,7 @@ std::string cell(const std::string& text) { return "<td>" + text + "</td>"; }
 bool blends_are_counted(const Json& dial) { return dial["settings"][0]["work"].contains("blends"); }
 
 std::string plots_of(const Json& dial) {
-  // Without an order between the settings there is no curve to draw; the table says all.
-  if (dial["theoretical_order"].is_null())
-    return "<p class=\"words\">" + escape_html(dial["theory"].get<std::string>()) + "</p>\n";
+  const bool has_order = !dial["theoretical_order"].is_null();
   std::string stages;
   for (const Json& stage : dial["stages"])
     stages += (stages.empty() ? "" : ", ") + stage.get<std::string>();
@@ -117,7 +115,7 @@ std::string plots_of(const Json& dial) {
     work.points.push_back(
         {setting["work"][of_frames ? "blends" : "macs"], psnr, label, is_default});
     order.points.push_back({setting["value"], setting["rmse"], label, is_default});
-    if (is_default && dial["theoretical_order"].get<double>() > 0) {
+    if (is_default && has_order && dial["theoretical_order"].get<double>() > 0) {
       const double p = dial["theoretical_order"], v = setting["value"], e = setting["rmse"];
       order.lines.push_back({{v / 8, e / std::pow(8, p), "", false},
                              {v * 8, e * std::pow(8, p), "", false},
@@ -128,17 +126,22 @@ std::string plots_of(const Json& dial) {
     return "<figure>" + svg_plot(plot) + "<figcaption>" + escape_html(caption) +
            "</figcaption></figure>\n";
   };
-  return "<div class=\"plots\">\n" +
-         figure(time,
-                "Error over the time of the stages that the dial touches: up and to the left is "
-                "better. Times move with the machine's mood.") +
+  const std::string theory = escape_html(dial["theory"].get<std::string>());
+  // Two settings without an order between them are told by the table.
+  if (!has_order && time.points.size() < 2) return "<p class=\"words\">" + theory + "</p>\n";
+  const std::string over_time =
+      figure(time,
+             "Error over the time of the stages that the dial touches: up and to the left is "
+             "better. Times move with the machine's mood.");
+  if (!has_order)
+    return "<div class=\"plots\">\n" + over_time + "<p class=\"words\">" + theory + "</p></div>\n";
+  return "<div class=\"plots\">\n" + over_time +
          figure(work, std::string("Error over work: ") + (of_frames ? "blends" : "operations") +
                           " do not depend on the machine.") +
          figure(order,
                 "Convergence: the slope is the observed order; dashed, the theoretical one through "
                 "the default.") +
-         "<div class=\"words\"><p><b>In theory.</b> " +
-         escape_html(dial["theory"].get<std::string>()) + " Order " +
+         "<div class=\"words\"><p><b>In theory.</b> " + theory + " Order " +
          formatted("%g", dial["theoretical_order"]) + ".</p><p><b>Observed.</b> " +
          (dial["observed_order"].is_null()
               ? "No error to speak of."

@@ -13,9 +13,7 @@ What XNNPACK runs does not depend on --isa, which limits figurine's own kernels:
 time without the network beside it.
 """
 
-import array
 import json
-import math
 import os
 import pathlib
 import statistics
@@ -23,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 
+import pfm
 import results
 
 ROUNDS = 5
@@ -101,24 +100,6 @@ def cases(before, after, folder):
     return table
 
 
-def read_pfm(path):
-    magic, size, _, pixels = path.read_bytes().split(b"\n", 3)
-    if magic not in (b"PF", b"PF4"):
-        sys.exit(f"{path}: not a colour PFM")
-    values = array.array("f")
-    values.frombytes(pixels)
-    return values, size
-
-
-def psnr_db(a, b):
-    values, size = read_pfm(a)
-    others, other_size = read_pfm(b)
-    if size != other_size or len(values) != len(others):
-        sys.exit(f"speed: {a} and {b} have different sizes")
-    squares = sum((x - y) ** 2 for x, y in zip(values, others))
-    return None if squares == 0 else -10 * math.log10(squares / len(values))
-
-
 def time_of(rows, **wanted):
     for row in rows:
         if all(row[key] == value for key, value in wanted.items()):
@@ -181,7 +162,7 @@ def main():
             rows.append(row)
             print(", ".join(f"{k} {v}" for k, v in results.rounded(row).items() if v != ""))
         pictures = {
-            path.stem: psnr_db(path, pathlib.Path(folder, "before.pfm"))
+            path.stem: pfm.psnr_db(path, pathlib.Path(folder, "before.pfm"))
             for path in sorted(pathlib.Path(folder).glob("*.pfm"))
             if path.stem in ("baseline", "neon", "sse41", "avx2", "avx512")
         }

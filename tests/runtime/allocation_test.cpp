@@ -85,7 +85,7 @@ TEST(Allocation, TheCounterSeesNewAndMalloc) {
   EXPECT_EQ(g_allocations - before, 2u);
 }
 
-void expect_no_allocations(uint32_t threads, Held held) {
+void expect_no_allocations(uint32_t threads, Held held, const Approximation& approximation = {}) {
   const SyntheticBody body = make_test_body({.uv_size = 32});
   const SyntheticAvatar avatar = make_test_avatar(body, {.held = held}),
                         other = make_test_avatar(
@@ -116,7 +116,10 @@ void expect_no_allocations(uint32_t threads, Held held) {
                                 {.avatar = *b, .pose = poses[kFrames - 1 - frame].view()},
                                 {.avatar = *c, .pose = poses[frame].view()}};
     ASSERT_TRUE(renderer
-                    ->render({.camera = cameras[frame], .avatars = seen, .gaussians = {&view, 1}},
+                    ->render({.camera = cameras[frame],
+                              .avatars = seen,
+                              .gaussians = {&view, 1},
+                              .approximation = approximation},
                              {.pixels = rgba.data(), .stride_bytes = 800})
                     .ok());
     if (frame == 0) after_first = g_allocations;
@@ -131,6 +134,7 @@ TEST(Allocation, NoFrameAllocatesAfterTheFirst) {
   if (!FIG_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer owns malloc";
   for (const Held held : {Held::kFloat32, Held::kFixedPoint}) {
     for (const uint32_t threads : {1u, 2u}) expect_no_allocations(threads, held);
+    expect_no_allocations(1, held, {.network_interval = 2, .averted_above = 0.2f});
   }
 }
 

@@ -82,14 +82,14 @@ Camera front_camera(uint32_t size_px, float distance_m, float vertical_fov_deg) 
 }
 
 Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads,
-             const SplatOptions& splat) {
+             const SplatOptions& splat, const Approximation& approximation) {
   const auto renderer = Renderer::create({.threads = threads, .allow_oversubscription = true});
   if (!renderer.ok()) stop(renderer.status());
   Picture picture;
   picture.rgba.assign(size_t(camera.width_px) * camera.height_px * 4,
                       std::numeric_limits<float>::quiet_NaN());  // every pixel must be written
   const Status status = (*renderer)->render(
-      {.camera = camera, .avatars = {}, .gaussians = sets, .background = {}, .splat = splat},
+      {.camera = camera, .gaussians = sets, .splat = splat, .approximation = approximation},
       {.pixels = picture.rgba.data(),
        .stride_bytes = 4 * sizeof(float) * camera.width_px,
        .format = PixelFormat::kRgbaF32});

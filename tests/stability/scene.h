@@ -59,7 +59,7 @@ struct Picture {
   FrameStatistics statistics;
 };
 Picture draw(std::span<const GaussianView> sets, const Camera& camera, uint32_t threads = 1,
-             const SplatOptions& splat = {});
+             const SplatOptions& splat = {}, const Approximation& approximation = {});
 Picture draw(const GaussianSet& set, const Camera& camera, const SplatOptions& splat = {});
 
 struct Agreement {

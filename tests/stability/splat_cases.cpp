@@ -447,6 +447,52 @@ Rows order() {
   return rows;
 }
 
+// A pixel of the fast tier stops with less than 1/255 of its light left, where the exact one goes
+// on; on top of it one contribution may fall on the other side of the cut or of the exact stop.
+constexpr double kFastStop = 1.0 / 255 + kCutFlip + kStopFlip;
+
+void add_fast_blend(Rows& rows, const std::string& name, const GaussianSet& set,
+                    const Camera& camera) {
+  const GaussianView view = set.view();
+  const Picture exact = draw({&view, 1}, camera),
+                fast = draw({&view, 1}, camera, 1, {}, {.fast_blend = true});
+  double largest = 0;
+  for (size_t i = 0; i < exact.rgba.size(); i += 4) {
+    const double a = exact.rgba[i + 3], b = fast.rgba[i + 3];
+    largest = std::max(largest, std::fabs(a - b));
+    for (size_t c = i; c < i + 3; ++c)
+      largest = std::max(largest, std::fabs(double(exact.rgba[c]) * a - double(fast.rgba[c]) * b));
+  }
+  if (count_not_finite(fast.rgba) > 0) largest = kNan;
+  rows.push_back({"fast blend: " + name,
+                  "largest difference of a premultiplied channel from the exact tier",
+                  Bound::kAtMost, kFastStop, largest});
+}
+
+Rows fast_blend() {
+  Rows rows;
+  const Camera camera = front_camera();
+  add_fast_blend(rows, "discs", make_cloud({}), camera);
+  add_fast_blend(rows, "discs of thickness 0", make_cloud({.scale_m = {0.02f, 0.02f, 0}}), camera);
+  add_fast_blend(rows, "needles of 0.5 m by 5 um", make_cloud({.scale_m = {0.5f, 5e-6f, 5e-6f}}),
+                 camera);
+  add_fast_blend(rows, "needles of 5 m by 5 nm",
+                 make_cloud({.count = 500, .scale_m = {5, 5e-9f, 5e-9f}}), camera);
+  add_fast_blend(rows, "points of extent 0",
+                 make_cloud({.count = 20000, .half_size_m = 0.4f, .scale_m = {0, 0, 0}}), camera);
+  add_fast_blend(rows, "opacity 1", make_cloud({.opacity_low = 1, .opacity_high = 1}), camera);
+  add_fast_blend(rows, "opacity at the cut",
+                 make_cloud({.opacity_low = kAlphaCut, .opacity_high = 1.01 * kAlphaCut}), camera);
+  add_fast_blend(rows, "larger than the screen",
+                 make_cloud({.count = 200, .scale_m = {20, 20, 20}}), camera);
+  GaussianSet layers;
+  for (int i = 0; i < 20000; ++i)
+    layers.add({0, 0, 1e-5f * static_cast<float>(i)}, factor_of({1, 0, 0, 0}, {0.3f, 0.3f, 0.001f}),
+               0.01f, {i % 2 == 0 ? 1.0f : 0.0f, 0.5f, 0.25f});
+  add_fast_blend(rows, "20,000 layers of opacity 0.01", layers, front_camera(32));
+  return rows;
+}
+
 constexpr Case kCases[] = {{"NearSingularCovariances", near_singular},
                            {"Needles", needles},
                            {"NearPlane", near_plane},
@@ -460,7 +506,8 @@ constexpr Case kCases[] = {{"NearSingularCovariances", near_singular},
                            {"FieldsOfView", fields_of_view},
                            {"Denormals", denormals},
                            {"NotANumber", not_a_number},
-                           {"OrderAndThreads", order}};
+                           {"OrderAndThreads", order},
+                           {"FastBlend", fast_blend}};
 
 }  // namespace
 }  // namespace splat

@@ -72,6 +72,20 @@ struct Approximation {
   // is for itself, but of several that are held once (Renderer::add_avatar) only that one profits
   // for which the network ran last. 0: every pose has its run.
   float network_below_px = 0;
+  // An avatar's network runs for one of this many poses. At those in between its outputs go on in
+  // the straight line of its last two runs, while skeleton, skinning and everything behind follow
+  // the pose as always. Avatars take turns. The picture then depends on the frames before it, and
+  // of several avatars that are held once nobody profits. At least 1: every pose has its run.
+  uint32_t network_interval = 1;
+  // Figures that are smaller than this in the image, by the box of their joints' positions, are
+  // drawn by their FrameAvatar::coarse where they have one. 0: never.
+  float coarse_below_px = 0;
+  // Texels are left out whose surface faces away from the camera: where the cosine of the angle
+  // between the line of sight and the posed normal is above this. A closed body hides them; what is
+  // thin, or not quite opaque, shows it. In [0, 1]; 1: none.
+  float averted_above = 1;
+  // Bands of spherical harmonics above this degree are left out.
+  uint32_t sh_degree = kMaxShDegree;
   // The fast tier of the blend: products added without rounding them first, 2^x by a cubic, and a
   // pixel stops at 1/255 of its light, after the contribution that took it there, in place of
   // 1/10,000 before it. Over 50 dB from the exact picture (docs/numerics.md, "Splatting"), and
@@ -82,6 +96,9 @@ struct Approximation {
 struct FrameAvatar {
   AvatarId avatar{};
   PoseView pose;
+  // The same person in fewer texels and a smaller network, or none, for when the figure is small
+  // (Approximation::coarse_below_px): of another body with the same joints.
+  std::optional<AvatarId> coarse = std::nullopt;
 };
 
 struct Frame {
@@ -117,7 +134,9 @@ struct FrameStatistics {
   uint64_t blends = 0;                           // contributions blended into pixels
   uint64_t macs = 0;
   uint64_t networks = 0;        // runs
-  uint64_t stale_networks = 0;  // runs that Approximation::network_below_px saved
+  uint64_t stale_networks = 0;  // runs that Approximation's network_below_px or _interval saved
+  uint64_t coarse_avatars = 0;  // drawn by their FrameAvatar::coarse
+  uint64_t averted_texels = 0;  // left out by Approximation::averted_above
   struct LeftOut {
     uint64_t hidden_texels = 0;
     uint64_t transparent = 0, outside = 0;  // Gaussians

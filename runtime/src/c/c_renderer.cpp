@@ -147,7 +147,11 @@ Status read_avatar(const fig_frame& frame, size_t i, fig_renderer renderer,
   if (!id.ok()) return id.status();
   const Result<PoseView> pose = pose_of(given.pose);
   if (!pose.ok()) return pose.status();
-  object.seen.push_back({.avatar = *id, .pose = *pose});
+  FrameAvatar& seen = object.seen.emplace_back(FrameAvatar{.avatar = *id, .pose = *pose});
+  if (given.coarse.id == 0) return {};
+  const Result<AvatarId> coarse = avatar_of(renderer, given.coarse);
+  if (!coarse.ok()) return coarse.status().within("coarse");
+  seen.coarse = *coarse;
   return {};
 }
 
@@ -218,6 +222,10 @@ Result<Frame> frame_of(const fig_frame* given, fig_renderer renderer, RendererOb
               .splat = {.alpha_cut = read.alpha_cut, .antialiased = *antialiased},
               .leave_out = *leave_out,
               .approximation = {.network_below_px = read.network_below_px,
+                                .network_interval = read.network_interval,
+                                .coarse_below_px = read.coarse_below_px,
+                                .averted_above = read.averted_above,
+                                .sh_degree = read.sh_degree,
                                 .fast_blend = read.fast_blend != 0}};
   if (const float* const rgb = read.background; rgb != nullptr)
     frame.background = std::array<float, 3>{rgb[0], rgb[1], rgb[2]};
@@ -309,6 +317,9 @@ static fig_frame default_frame() {
   frame.struct_bytes = sizeof frame;
   frame.alpha_cut = kAlphaCut;
   frame.leave_out = FIG_LEAVE_OUT_ALL;
+  frame.network_interval = 1;
+  frame.averted_above = 1;
+  frame.sh_degree = kMaxShDegree;
   return frame;
 }
 void fig_set_default_frame(fig_frame* value, size_t struct_bytes) {

@@ -66,12 +66,13 @@ class FloatAvatarNetwork : public AvatarNetwork {
   MapTarget input() override { return {runner_->input().data(), input_channels_}; }
   Status run(std::span<const uint32_t>) override { return runner_->run(); }
   void run_further(std::span<const uint32_t>) override {}
-  void find_heads(const uint32_t (&rows)[kernels::kLanes],
+  Status run_all() override { return runner_->run(); }
+  std::span<const float> outputs() const override { return std::as_const(*runner_).output(); }
+  void find_heads(const float* outputs, const uint32_t (&rows)[kernels::kLanes],
                   const float* (&heads)[kernels::kLanes]) const override {
-    const float* const output = std::as_const(*runner_).output().data();
     const std::span<const uint32_t> cell = grid_.cell();
     for (uint32_t lane = 0; lane < kernels::kLanes; ++lane)
-      heads[lane] = output + size_t{cell[rows[lane]]} * head_channels_;
+      heads[lane] = outputs + size_t{cell[rows[lane]]} * head_channels_;
   }
   uint64_t macs() const override { return runner_->macs(); }
   uint64_t memory_bytes() const override { return runner_->memory_bytes(); }
@@ -125,11 +126,15 @@ class FixedPointAvatarNetwork : public AvatarNetwork {
   void run_further(std::span<const uint32_t> wanted_blocks) override {
     runner_->run_further(take_missing(wanted_blocks));
   }
-  void find_heads(const uint32_t (&rows)[kernels::kLanes],
+  Status run_all() override {
+    std::fill_n(evaluated_.data(), grid_.cell_blocks(), uint8_t{1});
+    return runner_->run();
+  }
+  std::span<const float> outputs() const override { return std::as_const(*runner_).output(); }
+  void find_heads(const float* outputs, const uint32_t (&rows)[kernels::kLanes],
                   const float* (&heads)[kernels::kLanes]) const override {
-    const float* const output = std::as_const(*runner_).output().data();
     for (uint32_t lane = 0; lane < kernels::kLanes; ++lane)
-      heads[lane] = output + size_t{rows[lane]} * head_channels_;
+      heads[lane] = outputs + size_t{rows[lane]} * head_channels_;
   }
   uint64_t macs() const override { return runner_->macs(); }
   uint64_t memory_bytes() const override {

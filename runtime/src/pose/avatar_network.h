@@ -31,8 +31,13 @@ class AvatarNetwork {
   // What run() of further blocks would have evaluated beside: the maps are still those of the last
   // run.
   virtual void run_further(std::span<const uint32_t> wanted_blocks) = 0;
-  // Where the outputs of covered cells are that have been evaluated, [head_channels] each.
-  virtual void find_heads(const uint32_t (&rows)[kernels::kLanes],
+  // run() for every cell.
+  virtual Status run_all() = 0;
+
+  // All outputs: of cells that have been evaluated those of the last run.
+  virtual std::span<const float> outputs() const = 0;
+  // Where the outputs of covered cells are, [head_channels] each, in outputs() or a copy of them.
+  virtual void find_heads(const float* outputs, const uint32_t (&rows)[kernels::kLanes],
                           const float* (&heads)[kernels::kLanes]) const = 0;
 
   virtual uint64_t macs() const = 0;

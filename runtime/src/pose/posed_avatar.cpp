@@ -1,6 +1,7 @@
 #include "runtime/src/pose/posed_avatar.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <limits>
 #include <new>
@@ -15,10 +16,18 @@ namespace {
 
 constexpr uint32_t kBlocksPerTask = 64;
 
+constexpr uint32_t kHiddenBlock = ~uint32_t{0};  // of PoseScratch::left_out
+static_assert(kernels::kLanes < 32);
+
+uint32_t texels_of_block(const BodyBlocks& blocks, uint32_t block) {
+  return std::min(kernels::kLanes, blocks.texels() - block * kernels::kLanes);
+}
+
 }  // namespace
 
 bool PoseScratch::ensure(uint32_t joints, uint32_t blocks) {
-  return transforms.ensure(joints, blocks) && seen.ensure(blocks) && wanted.ensure(blocks);
+  return transforms.ensure(joints, blocks) && own_from_rest.ensure(joints) &&
+         left_out.ensure(blocks) && wanted.ensure(blocks);
 }
 
 Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, const Body& body,
@@ -85,25 +94,53 @@ Status PosedAvatar::shape(const Avatar& avatar) {
   return {};
 }
 
-void PosedAvatar::select_blocks(const kernels::View* view, const LeaveOut& leave_out,
-                                PoseScratch& scratch) const {
+void PosedAvatar::select_blocks(const PoseJob& job, PoseScratch& scratch) const {
   const uint32_t count = blocks_.count();
   const GaussianBounds bounds = bounds_of(decoding_, extent_blocks_.largest_m());
-  const bool all = view == nullptr || !leave_out.hidden_texels ||
-                   !(bounds.offset_m < std::numeric_limits<float>::infinity());
-  if (!all) {
+  const float averted_above = job.approximation.averted_above;
+  const bool may_hide = job.view != nullptr && job.leave_out.hidden_texels &&
+                        bounds.offset_m < std::numeric_limits<float>::infinity(),
+             may_avert = job.view != nullptr && averted_above < 1;
+  if (may_hide || may_avert) {
     pool_.for_each((count + kBlocksPerTask - 1) / kBlocksPerTask, [&](size_t task) {
       const uint32_t begin = static_cast<uint32_t>(task) * kBlocksPerTask;
       for (uint32_t block = begin; block < std::min(begin + kBlocksPerTask, count); ++block) {
-        scratch.seen[block] =
-            may_be_seen(canonical_[block], scratch.transforms[block], bounds, *view) ? 1 : 0;
+        const kernels::CanonicalBlock& texels = canonical_[block];
+        const kernels::TransformBlock& transforms = scratch.transforms[block];
+        const bool hidden = may_hide && !may_be_seen(texels, transforms, bounds, *job.view);
+        scratch.left_out[block] =
+            hidden      ? kHiddenBlock
+            : may_avert ? find_averted(blocks_[block], texels, transforms, *job.view, averted_above)
+                        : 0;
       }
     });
+  } else {
+    std::fill_n(scratch.left_out.data(), count, 0u);
   }
   scratch.wanted_count = 0;
+  scratch.hidden_texels = scratch.averted_texels = 0;
   for (uint32_t block = 0; block < count; ++block) {
-    if (all || scratch.seen[block] != 0) scratch.wanted[scratch.wanted_count++] = block;
+    const uint32_t texels = texels_of_block(blocks_, block), all = (1u << texels) - 1,
+                   left_out = scratch.left_out[block];
+    if (left_out == kHiddenBlock) {
+      scratch.hidden_texels += texels;
+      continue;
+    }
+    scratch.averted_texels += static_cast<uint64_t>(std::popcount(left_out & all));
+    if ((left_out & all) != all) scratch.wanted[scratch.wanted_count++] = block;
   }
+}
+
+bool PosedAvatar::is_smaller(const PoseView& pose, const kernels::View& view, float side_px,
+                             PoseScratch& scratch) const {
+  const uint32_t joints = body_.joint_count();
+  const float* const rest_m = joint_position_m_.data();
+  skinning_transforms({body_.parents, joint_position_m_.span(size_t{3} * joints)}, pose,
+                      scratch.own_from_rest.span(joints));
+  BoxInImage box;
+  for (uint32_t joint = 0; joint < joints; ++joint)
+    widen(transform_point(scratch.own_from_rest[joint], rest_m + 3 * joint).data(), view, box);
+  return box.side_px() < side_px;
 }
 
 bool PosedAvatar::is_small(const PoseJob& job, const Transforms& transforms) const {
@@ -124,28 +161,60 @@ bool PosedAvatar::is_last_pose(const PoseView& pose) const {
               sizeof(last_run_.root_translation_m));
 }
 
+// Whether the last run was one of a row for this avatar.
+bool PosedAvatar::is_continued(const PoseJob& job) const {
+  return line_.begun() && last_run_.done && job.avatar && job.avatar == last_run_.avatar;
+}
+
 NetworkUse PosedAvatar::choose_use(const PoseJob& job, const PoseScratch& scratch) const {
   if (network_ == nullptr || scratch.wanted_count == 0) return NetworkUse::kNone;
-  if (!last_run_.done) return NetworkUse::kRun;
+  if (const uint32_t interval = job.approximation.network_interval; interval > 1) {
+    const bool due =
+        !is_continued(job) || last_run_.poses_left == 0 || last_run_.poses_since + 1 >= interval;
+    return due ? NetworkUse::kRun : NetworkUse::kContinued;
+  }
+  // What is drawn with a line is not the last run's outputs.
+  if (!last_run_.done || line_.begun()) return NetworkUse::kRun;
   if (job.leave_out.unchanged_networks && is_last_pose(job.pose)) return NetworkUse::kUnchanged;
   const bool stale =
       job.avatar && job.avatar == last_run_.avatar && is_small(job, scratch.transforms);
   return stale ? NetworkUse::kStale : NetworkUse::kRun;
 }
 
+// Runs the network on its input; with an interval, on all of it.
+Status PosedAvatar::evaluate_network(const PoseJob& job, const PoseScratch& scratch) {
+  const uint32_t interval = job.approximation.network_interval;
+  if (interval == 1 || !job.avatar) {
+    line_.forget();
+    return network_->run(scratch.wanted_blocks());
+  }
+  const bool continued = is_continued(job);
+  if (continued && !line_.begin_at(network_->outputs()))
+    return out_of_memory("a network's outputs");
+  FIG_RETURN_IF_ERROR(network_->run_all());
+  if (!continued && !line_.begin_at(network_->outputs()))
+    return out_of_memory("a network's outputs");
+  last_run_.poses_between = continued ? last_run_.poses_since + 1 : 1;
+  last_run_.poses_since = 0;
+  // Avatars that begin together take turns from then on.
+  last_run_.poses_left =
+      interval - 1 - (continued ? 0 : static_cast<uint32_t>(*job.avatar) % interval);
+  return {};
+}
+
 Status PosedAvatar::run_network(const PoseJob& job, const PoseScratch& scratch, StageClock& clock) {
-  last_run_.done = false;
   {
     const StageClock::Scope timed(clock, Stage::kMaps);
     draw_maps(*grid_, blocks_, scratch.transforms, root_position(body_.mean_skeleton(), job.pose),
               statistics_, network_->input(), pool_, kernels_);
   }
   const StageClock::Scope timed(clock, Stage::kNetwork);
-  FIG_RETURN_IF_ERROR(network_->run(scratch.wanted_blocks()));
+  const Status evaluated = evaluate_network(job, scratch);
+  last_run_.done = evaluated.ok();
+  FIG_RETURN_IF_ERROR(evaluated);
   std::copy(job.pose.rotations.begin(), job.pose.rotations.end(), last_run_.rotations.data());
   last_run_.root_translation_m = job.pose.root_translation_m;
   last_run_.avatar = job.avatar;
-  last_run_.done = true;
   return {};
 }
 
@@ -155,14 +224,23 @@ Result<NetworkUse> PosedAvatar::pose(const PoseJob& job, PoseScratch& scratch, S
     const StageClock::Scope timed(clock, Stage::kSkin);
     scratch.transforms.pose(body_, blocks_, joint_position_m_.span(size_t{3} * body_.joint_count()),
                             job.pose, pool_, kernels_);
-    select_blocks(job.view, job.leave_out, scratch);
+    select_blocks(job, scratch);
     use = choose_use(job, scratch);
   }
   if (use == NetworkUse::kRun) {
     FIG_RETURN_IF_ERROR(run_network(job, scratch, clock));
   } else if (use != NetworkUse::kNone) {
     const StageClock::Scope timed(clock, Stage::kNetwork);
-    network_->run_further(scratch.wanted_blocks());
+    if (use == NetworkUse::kContinued) {
+      ++last_run_.poses_since, --last_run_.poses_left;
+    } else {
+      network_->run_further(scratch.wanted_blocks());
+    }
+  }
+  if (line_.begun() && use != NetworkUse::kNone) {
+    const StageClock::Scope timed(clock, Stage::kNetwork);
+    line_.go_on(network_->outputs(), static_cast<float>(last_run_.poses_since) /
+                                         static_cast<float>(last_run_.poses_between));
   }
   return use;
 }
@@ -175,19 +253,20 @@ void PosedAvatar::find_heads(uint32_t block, kernels::DecodeSkinJob& job) const 
     std::fill_n(job.head[0], kernels::kLanes, kNoHead);
     return;
   }
+  const float* const outputs = line_.begun() ? line_.outputs() : network_->outputs().data();
   job.taps = grid_->taps(block);
   if (job.taps != nullptr) {
     for (uint32_t k = 0; k < kernels::kTaps; ++k)
-      network_->find_heads(job.taps->row[k], job.head[k]);
+      network_->find_heads(outputs, job.taps->row[k], job.head[k]);
     return;
   }
   uint32_t rows[kernels::kLanes];
   for (uint32_t lane = 0; lane < kernels::kLanes; ++lane)
     rows[lane] = texel_of_lane(block, lane, blocks_.texels());
-  network_->find_heads(rows, job.head[0]);
+  network_->find_heads(outputs, rows, job.head[0]);
 }
 
-uint32_t PosedAvatar::decode(const PoseScratch& scratch, uint32_t block,
+uint32_t PosedAvatar::decode(const PoseScratch& scratch, uint32_t block, uint32_t sh_degree,
                              kernels::GaussianBlock& out) const {
   kernels::DecodeSkinJob job{.head = {},
                              .taps = nullptr,
@@ -201,16 +280,18 @@ uint32_t PosedAvatar::decode(const PoseScratch& scratch, uint32_t block,
                                                : decoding_.max_offset,
                              .max_log_scale = decoding_.max_log_scale,
                              .opacity_bias = decoding_.opacity_bias,
-                             .sh_values = 3 * sh_coefficients(decoding_.sh_degree),
+                             .sh_values = 3 * sh_coefficients(sh_degree),
                              .gaussians = &out};
   find_heads(block, job);
   kernels_.decode_skin(job);
-  return std::min(kernels::kLanes, blocks_.texels() - block * kernels::kLanes);
+  for (uint32_t left = scratch.left_out[block]; left != 0; left &= left - 1)
+    out.opacity[std::countr_zero(left)] = 0;
+  return texels_of_block(blocks_, block);
 }
 
 uint64_t PosedAvatar::memory_bytes() const {
   return (network_ == nullptr ? 0 : network_->memory_bytes()) + last_run_.rotations.memory_bytes() +
-         joint_position_m_.memory_bytes() + canonical_.memory_bytes() +
+         line_.memory_bytes() + joint_position_m_.memory_bytes() + canonical_.memory_bytes() +
          static_blocks_.memory_bytes() + extent_blocks_.memory_bytes();
 }
 

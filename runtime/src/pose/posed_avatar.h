@@ -28,6 +28,7 @@
 #include "runtime/src/pose/body_blocks.h"
 #include "runtime/src/pose/body_grid.h"
 #include "runtime/src/pose/extent_blocks.h"
+#include "runtime/src/pose/output_line.h"
 #include "runtime/src/pose/static_blocks.h"
 #include "runtime/src/pose/transforms.h"
 
@@ -37,14 +38,17 @@ namespace figurine {
 // before the next.
 struct PoseScratch {
   Transforms transforms;
-  Buffer<uint8_t> seen;     // [blocks]
-  Buffer<uint32_t> wanted;  // [blocks] the wanted ones, ascending
+  Buffer<Affine> own_from_rest;  // [J] of a figure whose size is asked for
+  Buffer<uint32_t> left_out;     // [blocks] a bit a lane
+  Buffer<uint32_t> wanted;       // [blocks] the wanted ones, ascending
   uint32_t wanted_count = 0;
+  uint64_t hidden_texels = 0, averted_texels = 0;
 
   bool ensure(uint32_t joints, uint32_t blocks);
   std::span<const uint32_t> wanted_blocks() const { return wanted.span(wanted_count); }
   uint64_t memory_bytes() const {
-    return transforms.memory_bytes() + seen.memory_bytes() + wanted.memory_bytes();
+    return transforms.memory_bytes() + own_from_rest.memory_bytes() + left_out.memory_bytes() +
+           wanted.memory_bytes();
   }
 };
 
@@ -64,7 +68,8 @@ enum class NetworkUse : uint8_t {
   kNone,       // nothing is wanted, or there is no network
   kRun,        // the network ran
   kUnchanged,  // its last run was for this pose
-  kStale       // its last run was for another pose of the avatar, which is small in the image
+  kStale,      // its last run was for another pose of the avatar, which is small in the image
+  kContinued   // its last run was for another pose of the avatar, and the next is not due
 };
 
 class PosedAvatar {
@@ -89,13 +94,18 @@ class PosedAvatar {
   // The network's; null without one.
   const std::shared_ptr<const BodyGrid>& grid() const { return grid_; }
 
+  // Whether a figure in this pose is smaller in the image, by the box of its joints.
+  bool is_smaller(const PoseView& pose, const kernels::View& view, float side_px,
+                  PoseScratch& scratch) const;
+
   // Transforms, maps and network of a pose. The scratch must have room and then says which blocks
   // are wanted.
   Result<NetworkUse> pose(const PoseJob& job, PoseScratch& scratch, StageClock& clock);
 
-  // The Gaussians of a wanted block of the last pose; returns how many lanes hold one. Callable by
-  // several threads at a time.
-  uint32_t decode(const PoseScratch& scratch, uint32_t block, kernels::GaussianBlock& out) const;
+  // The Gaussians of a wanted block of the last pose, with spherical harmonics to a degree that is
+  // at most the avatar's; returns how many lanes hold one. Callable by several threads at a time.
+  uint32_t decode(const PoseScratch& scratch, uint32_t block, uint32_t sh_degree,
+                  kernels::GaussianBlock& out) const;
 
   uint64_t memory_bytes() const;  // without the grid, which others may share
 
@@ -113,18 +123,22 @@ class PosedAvatar {
 
   Status shape(const Avatar& avatar);
   Status prepare_network(const Avatar& avatar, std::shared_ptr<const BodyGrid> grid);
-  void select_blocks(const kernels::View* view, const LeaveOut& leave_out,
-                     PoseScratch& scratch) const;
+  void select_blocks(const PoseJob& job, PoseScratch& scratch) const;
   NetworkUse choose_use(const PoseJob& job, const PoseScratch& scratch) const;
+  bool is_continued(const PoseJob& job) const;
   bool is_last_pose(const PoseView& pose) const;
   bool is_small(const PoseJob& job, const Transforms& transforms) const;
   Status run_network(const PoseJob& job, const PoseScratch& scratch, StageClock& clock);
+  Status evaluate_network(const PoseJob& job, const PoseScratch& scratch);
   void find_heads(uint32_t block, kernels::DecodeSkinJob& job) const;
 
   // Which pose the network's last run was for.
   struct LastRun {
     bool done = false;
     std::optional<AvatarId> avatar;
+    // For OutputLine: poses that its outputs served beside; to it from the run before; and those
+    // that they may serve further.
+    uint32_t poses_since = 0, poses_between = 1, poses_left = 0;
     std::array<float, 3> root_translation_m{};
     Buffer<float> rotations;  // [J,4]
   };
@@ -140,6 +154,7 @@ class PosedAvatar {
   std::shared_ptr<const BodyGrid> grid_;    // in front of what borrows from it
   std::unique_ptr<AvatarNetwork> network_;  // null: the static part is all there is
   LastRun last_run_;
+  OutputLine line_;
   Buffer<float> joint_position_m_;             // [J,3] of the template the Gaussians sit on
   Buffer<kernels::CanonicalBlock> canonical_;  // [blocks]
   StaticBlocks static_blocks_;

@@ -120,6 +120,33 @@ bool may_be_seen(const kernels::CanonicalBlock& texels, const kernels::Transform
   return false;
 }
 
+uint32_t find_averted(const kernels::TexelBlock& body, const kernels::CanonicalBlock& texels,
+                      const kernels::TransformBlock& transforms, const kernels::View& view,
+                      float cosine) {
+  float averted[kernels::kLanes];  // > 0: by that much
+  for (uint32_t lane = 0; lane < kernels::kLanes; ++lane) {
+    float normal[3], sight[3];
+    for (uint32_t i = 0; i < 3; ++i) {
+      float centre = transforms.own_translation_m[i][lane];
+      normal[i] = 0;
+      for (uint32_t j = 0; j < 3; ++j) {
+        centre += transforms.linear[3 * i + j][lane] * texels.position_m[j][lane];
+        normal[i] += transforms.linear[3 * i + j][lane] * body.mean_normal[j][lane];
+      }
+      sight[i] = centre - view.camera_centre_m[i];
+    }
+    const float along = normal[0] * sight[0] + normal[1] * sight[1] + normal[2] * sight[2];
+    const float lengths2 = (normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) *
+                           (sight[0] * sight[0] + sight[1] * sight[1] + sight[2] * sight[2]);
+    averted[lane] = along * std::fabs(along) - cosine * cosine * lengths2;
+  }
+  // Written so that anything not comparable counts as facing the camera.
+  uint32_t lanes = 0;
+  for (uint32_t lane = 0; lane < kernels::kLanes; ++lane)
+    lanes |= (averted[lane] > 0 ? 1u : 0u) << lane;
+  return lanes;
+}
+
 float BoxInImage::side_px() const {
   const float width = right_px - left_px, height = bottom_px - top_px;
   // Written so that anything not comparable counts as infinite.
@@ -129,21 +156,25 @@ float BoxInImage::side_px() const {
              : std::numeric_limits<float>::infinity();
 }
 
-void widen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
-           const kernels::View& view, BoxInImage& box) {
-  float centre[3];
-  find_centre(texels, transforms, 0, centre);
-  const float z = along(view, 2, centre);
+void widen(const float* point, const kernels::View& view, BoxInImage& box) {
+  const float z = along(view, 2, point);
   if (!(z > view.near_m)) {
     box.right_px = box.bottom_px = std::numeric_limits<float>::infinity();
     return;
   }
-  const float x = view.fx_px * (along(view, 0, centre) / z) + view.cx_px,
-              y = view.fy_px * (along(view, 1, centre) / z) + view.cy_px;
+  const float x = view.fx_px * (along(view, 0, point) / z) + view.cx_px,
+              y = view.fy_px * (along(view, 1, point) / z) + view.cy_px;
   box.left_px = std::min(box.left_px, x);
   box.right_px = std::max(box.right_px, x);
   box.top_px = std::min(box.top_px, y);
   box.bottom_px = std::max(box.bottom_px, y);
+}
+
+void widen(const kernels::CanonicalBlock& texels, const kernels::TransformBlock& transforms,
+           const kernels::View& view, BoxInImage& box) {
+  float centre[3];
+  find_centre(texels, transforms, 0, centre);
+  widen(centre, view, box);
 }
 
 }  // namespace figurine

@@ -84,7 +84,7 @@ void Rasterizer::finish_add(const BlockSet& set, uint64_t elapsed_ns, StageClock
 
 void Rasterizer::add(const GaussianView& gaussians, bool antialiased, StageClock& clock) {
   add({.blocks = block_count(gaussians.count),
-       .sh_degree = gaussians.sh_degree,
+       .sh_degree = std::min(gaussians.sh_degree, approximation_.sh_degree),
        .antialiased = antialiased},
       clock, [&](uint32_t block, kernels::GaussianBlock& out) {
         return load_block(gaussians, block, out);

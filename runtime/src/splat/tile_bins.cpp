@@ -11,7 +11,7 @@ constexpr uint32_t kTile = static_cast<uint32_t>(kernels::kTileSize);
 // A Gaussian of a person touches 1 to 4 tiles at usual sizes. The list holds at least one pair per
 // Gaussian, so every single tile fits.
 constexpr size_t kPairsPerSplat = 4, kMinPairs = 65536;
-constexpr uint32_t kSplatsPerSection = 2048;  // fewer are not worth a thread's waking
+constexpr uint32_t kSplatsPerSection = 8192;  // fewer are not worth a thread's waking
 
 // Columns of tiles that the splat's ellipse may touch in a row of tiles, ends included.
 struct Columns {

@@ -228,7 +228,8 @@ struct Stage32 {
   std::vector<kernels::GaussianBlock> decode(const PosedAvatar& posed) {
     std::vector<kernels::GaussianBlock> gaussians;
     for (const uint32_t block : scratch.wanted_blocks())
-      posed.decode(scratch, block, gaussians.emplace_back(kernels::GaussianBlock{}));
+      posed.decode(scratch, block, posed.sh_degree(),
+                   gaussians.emplace_back(kernels::GaussianBlock{}));
     return gaussians;
   }
 

@@ -143,7 +143,8 @@ TEST(TileBins, ExactListsMissNoTileThatAPixelCentreOfTheEllipseIsIn) {
 }
 
 TEST(TileBins, AreTheSameForAnyNumberOfThreads) {
-  const std::vector<Splat> splats = random_splats(9000, 60);
+  // Enough for three sections.
+  const std::vector<Splat> splats = random_splats(30000, 60);
   const std::vector<DepthSort::Item> sorted = reversed(splats.size());
   const Binned one = bin(splats, sorted, true, 1, splats.size());
   for (const uint32_t threads : {2u, 3u}) {
@@ -155,13 +156,13 @@ TEST(TileBins, AreTheSameForAnyNumberOfThreads) {
 }
 
 TEST(TileBins, MorePairsThanTheListHoldsComeInBands) {
-  // 9,000 splats over all 35 tiles are 315,000 pairs; the list holds 65,536.
-  std::vector<Splat> splats(9000, ellipse(100, 65, 1e6f, 0, 1e6f));
+  // 18,000 splats over all 35 tiles are 630,000 pairs; the list holds 72,000.
+  std::vector<Splat> splats(18000, ellipse(100, 65, 1e6f, 0, 1e6f));
   const std::vector<DepthSort::Item> sorted = reversed(splats.size());
   for (const uint32_t threads : {1u, 2u}) {
     const Binned binned = bin(splats, sorted, true, threads, splats.size());
-    EXPECT_EQ(binned.pairs, 9000u * 35);
-    EXPECT_EQ(binned.bands, 5u) << "7 tiles of 9,000 fit";
+    EXPECT_EQ(binned.pairs, 18000u * 35);
+    EXPECT_EQ(binned.bands, 9u) << "4 tiles of 18,000 fit";
     EXPECT_EQ(binned.lists, boxes(splats, sorted));
   }
 }

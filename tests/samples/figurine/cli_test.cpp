@@ -434,6 +434,55 @@ TEST_F(Cli, TheFastBlendIsAskedForByName) {
   EXPECT_EQ(render("--fast-blend")["fast_blend"], true);
 }
 
+TEST_F(Cli, WhatIsLeftOutIsAskedForByName) {
+  const auto render = [&](const std::string& option) {
+    const ProgramRun result =
+        run("render P/avatar.fgn --motion P/motion.fgn --frames 0:6 --size 64x64 --fps 30 --json "
+            "-o x_%02d.png " +
+            option);
+    EXPECT_EQ(result.exit_code, 0) << option << ": " << result.err;
+    return Json::parse(result.out);
+  };
+  const Json plain = render("");
+  EXPECT_EQ(plain["network_interval"], 1);
+  EXPECT_EQ(plain["averted_above"], 1.0);
+  const Json slow = render("--network-hz 10");
+  EXPECT_EQ(slow["network_interval"], 3);
+  EXPECT_NEAR(slow["work"]["networks"].get<double>(), 1.0 / 3, 1e-9);
+  EXPECT_EQ(render("--network-hz 60")["network_interval"], 1);
+  const Json facing = render("--averted-above 0");
+  EXPECT_GT(facing["work"]["averted_texels"], 0.0);
+  EXPECT_LT(facing["work"]["gaussians"], plain["work"]["gaussians"]);
+  EXPECT_EQ(render("--sh-degree 0")["sh_degree"], 0);
+  // More is looked at, and the same drawn.
+  EXPECT_GT(render("--keep missed-tiles --keep stopped")["work"]["pairs"], plain["work"]["pairs"]);
+  EXPECT_EQ(render("--keep missed-tiles")["work"]["blends"], plain["work"]["blends"]);
+  EXPECT_EQ(run("render P/avatar.fgn -o x.png --keep nothing").exit_code, 2);
+  EXPECT_EQ(run("render P/avatar.fgn -o x.png --averted-above 1.5").exit_code, 2);
+}
+
+TEST_F(Cli, ACrowdIsManyOfEveryAvatar) {
+  const auto render = [&](const std::string& option) {
+    const ProgramRun result = run("render P/avatar.fgn --size 96x96 --json -o x.png " + option);
+    EXPECT_EQ(result.exit_code, 0) << option << ": " << result.err;
+    return Json::parse(result.out);
+  };
+  const Json one = render(""), crowd = render("--motion P/motion.fgn --crowd 9");
+  EXPECT_EQ(crowd["work"]["gaussians"], 9 * one["work"]["gaussians"].get<int>());
+  EXPECT_EQ(crowd["work"]["networks"], 9.0) << "each has a pose of its own";
+  const Json coarse =
+      render("--motion P/motion.fgn --crowd 4 --coarse P/avatar.fgn --coarse-below-px 96");
+  EXPECT_EQ(coarse["work"]["coarse_avatars"], 4.0);
+  const ProgramRun placed = run("render P/avatar.fgn --crowd 4 --place 0,0 -o x.png");
+  EXPECT_EQ(placed.exit_code, 1);
+  EXPECT_NE(placed.err.find("place: a crowd"), std::string::npos) << placed.err;
+  const ProgramRun two =
+      run("render P/avatar.fgn P/avatar.fgn P/avatar.fgn --coarse P/avatar.fgn "
+          "--coarse P/avatar.fgn -o x.png");
+  EXPECT_EQ(two.exit_code, 1);
+  EXPECT_NE(two.err.find("coarse: give one for all"), std::string::npos) << two.err;
+}
+
 TEST_F(Cli, BenchTakesSeveralFigures) {
   const auto bench = [&](const std::string& arguments) {
     const ProgramRun result = run("bench " + arguments + " --frames 3 --threads 1 --json -");
@@ -500,12 +549,16 @@ TEST_F(Cli, ReportHasADialOfPrecisionsWhereThereAreTwo) {
   const ProgramRun result = run("report P/both.fgn --motion P/motion.fgn --frames 2 --json -o r");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json json = Json::parse(result.out);
-  ASSERT_EQ(json["dials"].size(), 3u);
+  ASSERT_EQ(json["dials"].size(), 4u);
+  const Json& averted = json["dials"][2];
+  EXPECT_EQ(averted["name"], "averted texels");
+  EXPECT_TRUE(averted["settings"].back()["psnr_db"].is_null()) << "nothing left out";
+  EXPECT_FALSE(averted["settings"].front()["psnr_db"].is_null());
   const Json& tiers = json["dials"][1]["settings"];
   EXPECT_EQ(tiers[0]["label"], "fast");
   EXPECT_GT(tiers[0]["psnr_db"], 40);
   EXPECT_TRUE(tiers[1]["psnr_db"].is_null()) << "the exact blend is the reference";
-  const Json& settings = json["dials"][2]["settings"];
+  const Json& settings = json["dials"][3]["settings"];
   ASSERT_EQ(settings.size(), 2u);
   EXPECT_EQ(settings[0]["label"], "q8");
   EXPECT_GT(settings[0]["psnr_db"], 20);
@@ -514,7 +567,7 @@ TEST_F(Cli, ReportHasADialOfPrecisionsWhereThereAreTwo) {
   EXPECT_NE(folder_.read("r/report.html").find("Precision"), std::string::npos);
   EXPECT_EQ(json["machine"]["precision"], "q8");
   ASSERT_EQ(run("report P/both.fgn --precision q8 --frames 1 -o r").exit_code, 0);
-  EXPECT_EQ(Json::parse(folder_.read("r/report.json"))["dials"].size(), 2u);
+  EXPECT_EQ(Json::parse(folder_.read("r/report.json"))["dials"].size(), 3u);
 }
 
 TEST_F(Cli, EveryCommandTakesAPrecision) {

@@ -1,0 +1,106 @@
+"""A crowd of small figures beside one large one: time, and what a coarse tier changes.
+
+    scripts/run python3 scripts/experiments/crowd.py [OUTPUT]
+
+Draws 64 of the shipped person (512x512, in the shipped walk, int8, one core), each some 60 pixels
+high and in a pose of its own, exactly and with what may be left out of small figures, and one
+figure of 400 pixels, by turns, ROUNDS times, by the build of `figurine` in build/release; then the
+crowd as float pictures, each held against the exact ones over the pixels that show somebody. Writes
+OUTPUT (docs/results/crowd.json), and prints it; some minutes on an idle core.
+"""
+
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+
+import pfm
+import results
+
+ROUNDS = 3
+BENCH_FRAMES = 24
+PICTURE_FRAMES = "8:12"
+FIGURINE = pathlib.Path("build/release/samples/figurine/figurine")
+PERSON = ["samples/packages/person.fgn", "--motion", "samples/packages/walk.fgn"]
+FRAME = ["--size", "512x512", "--precision", "q8", "--threads", "1"]
+# From far and above, so that rows do not hide each other.
+CROWD = ["--crowd", "64", "--spacing", "1.6", "--camera", "orbit:20,35,40,19"]
+COARSE = ["--coarse", "samples/packages/person-coarse.fgn", "--coarse-below-px", "100"]
+
+CASES = {
+    "one": ["--framing", "body"],
+    "exact": CROWD,
+    "network at one of 4 frames": [*CROWD, "--network-hz", "7.5"],
+    "averted above 0.25": [*CROWD, "--averted-above", "0.25"],
+    "coarse": [*CROWD, *COARSE],
+    "coarse, averted above 0.25, fast blend": [
+        *CROWD, *COARSE, "--averted-above", "0.25", "--fast-blend",
+    ],
+}  # fmt: skip
+
+
+def run(*arguments):
+    command = [str(FIGURINE.resolve()), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        sys.exit(f"crowd: {' '.join(command)}: {done.stderr.strip()}")
+    return json.loads(done.stdout)
+
+
+def bench(options):
+    report = run("bench", *PERSON, *FRAME, "--frames", BENCH_FRAMES, "--json", "-", *options)
+    (lane,) = report["runs"]
+    return lane, report["machine"]["cpu"]
+
+
+def draw(folder, name, options):
+    out = pathlib.Path(folder, f"{name}_%04d.pfm")
+    run("render", *PERSON, *FRAME, "--frames", PICTURE_FRAMES, "-o", out, "--json", *options)
+    return sorted(pathlib.Path(folder).glob(f"{name}_*.pfm"))
+
+
+def error_db(truths, pictures):
+    squares, count = 0.0, 0
+    for truth, picture in zip(truths, pictures):
+        more, values = pfm.foreground_error(truth, picture)
+        squares, count = squares + more, count + values
+    return pfm.decibels(squares, count)
+
+
+def main():
+    if len(sys.argv) > 2:
+        sys.exit("usage: crowd.py [OUTPUT]")
+    output = pathlib.Path(sys.argv[1] if len(sys.argv) == 2 else "docs/results/crowd.json")
+    load, lanes, cpu = os.getloadavg()[0], {name: [] for name in CASES}, ""
+    for turn in range(ROUNDS):
+        for name in list(CASES)[:: 1 if turn % 2 else -1]:
+            lane, cpu = bench(CASES[name])
+            lanes[name].append(lane)
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        truths = draw(folder, "exact", CASES["exact"])
+        for i, (name, options) in enumerate(CASES.items()):
+            row = {"tier": name, "figures": 1 if name == "one" else 64}
+            row["options"] = " ".join(options[len(CROWD) if name != "one" else 0 :])
+            for field in ("total", "network", "blend"):
+                times = [lane["stages_ms"][field]["median"] for lane in lanes[name]]
+                row[f"{field}_ms"] = statistics.median(times)
+            row["gaussians"] = lanes[name][0]["work"]["gaussians"]
+            row["of_one_figure"] = row["total_ms"] / (rows[0] if rows else row)["total_ms"]
+            row["psnr_db"] = (
+                None if name in ("one", "exact")
+                else error_db(truths, draw(folder, f"picture{i}", options))
+            )  # fmt: skip
+            rows.append(row)
+            print(", ".join(f"{key} {value}" for key, value in results.rounded(row).items()))
+    report = results.head("scripts/experiments/crowd.py")
+    report["machine"] = {"cpu": cpu, "load_before": load}
+    report |= {"rounds": ROUNDS, "frames": BENCH_FRAMES, "rows": rows}
+    results.write(output, report)
+
+
+if __name__ == "__main__":
+    main()
