@@ -38,13 +38,15 @@ Status xnnpack_status(xnn_status status, const char* what) {
 }
 
 Status initialize_xnnpack() {
-  // It asks cpuinfo for the CPU, which on Linux means reading /proc.
+  // It asks cpuinfo for the CPU, which on Linux reads files; on ARM it gives up without the lists
+  // of CPUs in /sys, which containers and phones may hide.
   const xnn_status status = xnn_initialize(nullptr);
   if (status == xnn_status_success) return {};
   Status error = xnnpack_status(status, "cannot start");
   if (status == xnn_status_out_of_memory) return error;
-  return Status(error.code(),
-                error.message() + "; it identifies the CPU through /proc, is that mounted?");
+  return Status(error.code(), error.message() +
+                                  "; it identifies the CPU by /proc/cpuinfo and by possible or "
+                                  "present in /sys/devices/system/cpu: are they there to read?");
 }
 
 pthreadpool* xnnpack_pool(const ThreadPool& pool) {
