@@ -1,12 +1,14 @@
 """A crowd of small figures beside one large one: time, and what a coarse tier changes.
 
-    scripts/run python3 scripts/experiments/crowd.py [OUTPUT]
+    scripts/run python3 scripts/experiments/crowd.py [COARSE.fgn]
+
+COARSE.fgn is the same person in less detail; without one those rows are left out.
 
 Draws 64 of the shipped person (512x512, in the shipped walk, int8, one core), each some 60 pixels
 high and in a pose of its own, exactly and with what may be left out of small figures, and one
 figure of 400 pixels, by turns, ROUNDS times, by the build of `figurine` in build/release; then the
 crowd as float pictures, each held against the exact ones over the pixels that show somebody. Writes
-OUTPUT (docs/results/crowd.json), and prints it; some minutes on an idle core.
+docs/results/crowd.json, and prints it; some minutes on an idle core.
 """
 
 import json
@@ -28,18 +30,20 @@ PERSON = ["samples/packages/person.fgn", "--motion", "samples/packages/walk.fgn"
 FRAME = ["--size", "512x512", "--precision", "q8", "--threads", "1"]
 # From far and above, so that rows do not hide each other.
 CROWD = ["--crowd", "64", "--spacing", "1.6", "--camera", "orbit:20,35,40,19"]
-COARSE = ["--coarse", "samples/packages/person-coarse.fgn", "--coarse-below-px", "100"]
+OUTPUT = pathlib.Path("docs/results/crowd.json")
 
 CASES = {
     "one": ["--framing", "body"],
     "exact": CROWD,
     "network at one of 4 frames": [*CROWD, "--network-hz", "7.5"],
     "averted above 0.25": [*CROWD, "--averted-above", "0.25"],
-    "coarse": [*CROWD, *COARSE],
-    "coarse, averted above 0.25, fast blend": [
-        *CROWD, *COARSE, "--averted-above", "0.25", "--fast-blend",
-    ],
-}  # fmt: skip
+}
+
+
+def with_coarse(package):
+    coarse = [*CROWD, "--coarse", package, "--coarse-below-px", "100"]
+    faster = [*coarse, "--averted-above", "0.25", "--fast-blend"]
+    return {"coarse": coarse, "coarse, averted above 0.25, fast blend": faster}
 
 
 def run(*arguments):
@@ -72,17 +76,17 @@ def error_db(truths, pictures):
 
 def main():
     if len(sys.argv) > 2:
-        sys.exit("usage: crowd.py [OUTPUT]")
-    output = pathlib.Path(sys.argv[1] if len(sys.argv) == 2 else "docs/results/crowd.json")
-    load, lanes, cpu = os.getloadavg()[0], {name: [] for name in CASES}, ""
+        sys.exit("usage: crowd.py [COARSE.fgn]")
+    cases = CASES | (with_coarse(sys.argv[1]) if len(sys.argv) == 2 else {})
+    load, lanes, cpu = os.getloadavg()[0], {name: [] for name in cases}, ""
     for turn in range(ROUNDS):
-        for name in list(CASES)[:: 1 if turn % 2 else -1]:
-            lane, cpu = bench(CASES[name])
+        for name in list(cases)[:: 1 if turn % 2 else -1]:
+            lane, cpu = bench(cases[name])
             lanes[name].append(lane)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        truths = draw(folder, "exact", CASES["exact"])
-        for i, (name, options) in enumerate(CASES.items()):
+        truths = draw(folder, "exact", cases["exact"])
+        for i, (name, options) in enumerate(cases.items()):
             row = {"tier": name, "figures": 1 if name == "one" else 64}
             row["options"] = " ".join(options[len(CROWD) if name != "one" else 0 :])
             for field in ("total", "network", "blend"):
@@ -96,10 +100,10 @@ def main():
             )  # fmt: skip
             rows.append(row)
             print(", ".join(f"{key} {value}" for key, value in results.rounded(row).items()))
-    report = results.head("scripts/experiments/crowd.py")
+    report = results.head(" ".join(["scripts/experiments/crowd.py", *sys.argv[1:]]))
     report["machine"] = {"cpu": cpu, "load_before": load}
     report |= {"rounds": ROUNDS, "frames": BENCH_FRAMES, "rows": rows}
-    results.write(output, report)
+    results.write(OUTPUT, report)
 
 
 if __name__ == "__main__":

@@ -5,9 +5,9 @@
 Draws the shipped person (512x512, in the shipped walk, int8, one core) with and without every
 omission, by turns, ROUNDS times, by the build of `figurine` in build/release; then frames of
 256x256 as float pictures, and holds those with the omission against those without, over the pixels
-that show the person. Exact omissions are on by default and have to leave every bit as it is; the others
-are asked for by name. Writes OUTPUT (docs/results/left_out.json), and prints it; a few minutes on
-an idle core.
+that show the person. Exact omissions are on by default and have to leave every bit as it is; the
+others are asked for by name. Writes OUTPUT (docs/results/left_out.json), and prints it; a few
+minutes on an idle core.
 """
 
 import json

@@ -24,7 +24,7 @@ if os.getuid() != 0:
 def run_masked(*command):
     """With an empty folder in the place of the CPUs."""
     with tempfile.TemporaryDirectory() as empty:
-        script = f'mount --bind {empty} {CPUS} && exec "$@"'
+        script = f'mount --make-rprivate /sys && mount --bind {empty} {CPUS} && exec "$@"'
         return subprocess.run([*OWN_MOUNTS, "sh", "-c", script, "sh", *map(str, command)],
                               capture_output=True, text=True, check=False)
 
