@@ -448,8 +448,8 @@ Rows order() {
 }
 
 // A pixel of the fast tier stops with less than 1/255 of its light left, where the exact one goes
-// on; on top of it one contribution may fall on the other side of the cut or of the exact stop.
-constexpr double kFastStop = 1.0 / 255 + kCutFlip + kStopFlip;
+// on; on top of it one contribution may fall on the other side of the exact stop, or of the cut.
+constexpr double kFastStop = 1.0 / 255 + kStopFlip;
 
 void add_fast_blend(Rows& rows, const std::string& name, const GaussianSet& set,
                     const Camera& camera) {

@@ -69,13 +69,25 @@ TEST_F(Omissions, WhatIsLeftOutIsAskedForByName) {
   EXPECT_EQ(render("--network-hz 60")["network_interval"], 1);
   const Json facing = render("--averted-above 0");
   EXPECT_GT(facing["work"]["averted_texels"], 0.0);
-  EXPECT_LT(facing["work"]["gaussians"], plain["work"]["gaussians"]);
+  EXPECT_LT(facing["work"]["visible"], plain["work"]["visible"]);
   EXPECT_EQ(render("--sh-degree 0")["sh_degree"], 0);
-  // More is looked at, and the same drawn.
-  EXPECT_GT(render("--keep missed-tiles --keep stopped")["work"]["pairs"], plain["work"]["pairs"]);
-  EXPECT_EQ(render("--keep missed-tiles")["work"]["blends"], plain["work"]["blends"]);
+  EXPECT_EQ(render("--keep missed-tiles --keep stopped")["work"]["blends"], plain["work"]["blends"])
+      << "more is looked at, and the same drawn";
   EXPECT_EQ(run("render avatar.fgn -o x.png --keep nothing").exit_code, 2);
   EXPECT_EQ(run("render avatar.fgn -o x.png --averted-above 1.5").exit_code, 2);
+}
+
+TEST_F(Omissions, WhatIsLeftOutExactlyIsComputedWhereThatIsAskedFor) {
+  const auto networks = [&](const std::string& option) {
+    const ProgramRun result =
+        run("render avatar.fgn avatar.fgn --place 0,0 --place 0,0 --size "
+            "32x32 --json -o x.png " +
+            option);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return Json::parse(result.out)["work"]["networks"].get<double>();
+  };
+  EXPECT_EQ(networks(""), 0.0) << "the pose is the one that the picture was framed by";
+  EXPECT_EQ(networks("--keep unchanged-networks"), 2.0);
 }
 
 TEST_F(Omissions, ACrowdIsManyOfEveryAvatar) {
