@@ -10,6 +10,7 @@
 #include "ports/host/clock.h"
 #include "ports/host/cpus.h"
 #include "samples/common/machine.h"
+#include "samples/common/scene.h"
 
 namespace figurine::samples {
 
@@ -56,6 +57,18 @@ void DeviceOptions::add_to(CLI::App& app, bool json_flag) {
       "arithmetic of the network: f32, or q8 (fixed point); default: q8 where the package has it");
   add_isa_option(app, isa);
   if (json_flag) app.add_flag("--json", json, "print a summary as JSON to standard output");
+}
+
+void add_crowd_options(CLI::App& app, SceneOptions& options) {
+  app.add_option("--coarse", options.coarse,
+                 "avatar packages of the same people in less detail, one for all or one for each: "
+                 "what small figures are drawn by (--coarse-below-px)")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--crowd", options.crowd,
+                 "so many of every avatar, in rows and columns, each at a moment of its own")
+      ->check(CLI::Range(1u, 1024u))
+      ->capture_default_str();
 }
 
 void OmissionOptions::add_to(CLI::App& app) {

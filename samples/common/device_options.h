@@ -40,6 +40,10 @@ void add_isa_option(CLI::App& app, std::string& isa);
 // the same bits with every one. kUnsupported for what is not there.
 Result<Isa> instruction_set(const std::string& isa);
 
+struct SceneOptions;
+// --coarse and --crowd.
+void add_crowd_options(CLI::App& app, SceneOptions& options);
+
 // What a command leaves out, exactly or although it shows.
 struct OmissionOptions {
   Approximation asked;

@@ -1,6 +1,5 @@
 #include "samples/common/scene.h"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -82,18 +81,6 @@ Result<std::shared_ptr<LoadedPackage>> body_of(const LoadedAvatar& avatar, const
 }
 
 }  // namespace
-
-void add_crowd_options(CLI::App& app, SceneOptions& options) {
-  app.add_option("--coarse", options.coarse,
-                 "avatar packages of the same people in less detail, one for all or one for each: "
-                 "what small figures are drawn by (--coarse-below-px)")
-      ->expected(1)
-      ->take_all();
-  app.add_option("--crowd", options.crowd,
-                 "so many of every avatar, in rows and columns, each at a moment of its own")
-      ->check(CLI::Range(1u, 1024u))
-      ->capture_default_str();
-}
 
 PoseView Scene::Figure::recorded_pose(uint32_t frame) const {
   if (motion) {

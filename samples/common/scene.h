@@ -14,10 +14,6 @@
 #include "samples/common/parse.h"
 #include "samples/common/pose_source.h"
 
-namespace CLI {
-class App;
-}
-
 namespace figurine::samples {
 
 struct SceneOptions {
@@ -31,8 +27,6 @@ struct SceneOptions {
   // its own of what they do.
   uint32_t crowd = 1;
 };
-// --coarse and --crowd.
-void add_crowd_options(CLI::App& app, SceneOptions& options);
 
 class Scene {
  public:
