@@ -21,6 +21,7 @@
 #include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/image_error.h"
+#include "samples/figurine/report_dials.h"
 #include "samples/figurine/report_files.h"
 #include "samples/figurine/report_page.h"
 #include "samples/figurine/sampler_report.h"
@@ -29,32 +30,6 @@ namespace figurine::samples {
 
 namespace {
 
-// What a setting may turn. A new kind of speed-up adds a member here and a row to dials().
-struct Knobs {
-  SplatOptions splat;
-  Approximation approximation;
-  std::optional<Precision> precision;  // without: the one that the report is made in
-};
-
-struct Setting {
-  std::string label;
-  double value = 0;  // the dial's position, for orders of convergence
-  bool is_default = false;
-  Knobs knobs;
-};
-
-struct Dial {
-  std::string name, meaning;
-  std::optional<double> theoretical_order;  // error ~ value^order; none: settings to choose from,
-                                            // with no order between them
-  std::string theory;
-  Knobs reference;
-  std::vector<Stage>
-      stages;  // that the dial can make cheaper: their time is the cost that is plotted
-  std::vector<Setting> settings;  // from coarse to fine
-};
-
-constexpr float kReferenceCut = 1e-7f;
 constexpr const char* kReferenceMeaning =
     "the same renderer with the alpha cut at 1e-7: every contribution that float arithmetic can "
     "tell from nothing is blended. The "
@@ -62,136 +37,6 @@ constexpr const char* kReferenceMeaning =
     "and the dilation of a Gaussian by part of a pixel are part of the definition of the picture "
     "and the same "
     "everywhere.";
-
-Dial alpha_cut_dial() {
-  Dial dial{
-      .name = "alpha cut",
-      .meaning =
-          "contributions to a pixel with an alpha below this are skipped; it decides how far "
-          "around its centre a Gaussian is drawn",
-      .theoretical_order = 1,
-      .theory =
-          "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is "
-          "missing from the picture falls in proportion to the "
-          "cut.",
-      .reference = {.splat = {.alpha_cut = kReferenceCut}, .approximation = {}, .precision = {}},
-      .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve},
-      .settings = {}};
-  for (const int inverse : {16, 32, 64, 128, 255, 512, 1024, 4096, 16384}) {
-    const double cut = 1.0 / inverse;
-    dial.settings.push_back({.label = "1/" + std::to_string(inverse),
-                             .value = cut,
-                             .is_default = static_cast<float>(cut) == kAlphaCut,
-                             .knobs = {.splat = {.alpha_cut = static_cast<float>(cut)},
-                                       .approximation = {},
-                                       .precision = {}}});
-  }
-  return dial;
-}
-
-// Both settings at the reference's alpha cut, which costs the network nothing: what is left of the
-// difference is the precision's own.
-Dial precision_dial() {
-  constexpr SplatOptions kSplat{.alpha_cut = kReferenceCut};
-  return {
-      .name = "precision",
-      .meaning =
-          "arithmetic of the network: q8 (int8 weights and activations) or f32, this dial's "
-          "reference; the value is the step of a "
-          "number that fills its range",
-      .theoretical_order = std::nullopt,
-      .theory =
-          "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the "
-          "layers add their errors up.",
-      .reference = {.splat = kSplat, .approximation = {}, .precision = Precision::kFloat32},
-      .stages = {Stage::kNetwork},
-      .settings = {
-          {.label = to_string(Precision::kFixedPoint),
-           .value = 0x1p-8,
-           .is_default = true,
-           .knobs = {.splat = kSplat, .approximation = {}, .precision = Precision::kFixedPoint}},
-          {.label = to_string(Precision::kFloat32),
-           .value = 0x1p-24,
-           .is_default = false,
-           .knobs = {.splat = kSplat, .approximation = {}, .precision = Precision::kFloat32}}}};
-}
-
-// At the default's alpha cut: what is left of the difference is the tier's.
-Dial blend_dial() {
-  constexpr Approximation kFast{.fast_blend = true};
-  return {.name = "blend",
-          .meaning =
-              "arithmetic of the blend: exact, this dial's reference, or the fast tier; the value "
-              "is the light at which a pixel stops",
-          .theoretical_order = std::nullopt,
-          .theory =
-              "A pixel that stops at 1/255 of its light is at most that far from the truth; the "
-              "cubic in place of 2^x is 7.5e-5 off, relative.",
-          .reference = {.splat = {}, .approximation = {}, .precision = {}},
-          .stages = {Stage::kBlend},
-          .settings = {{.label = "fast",
-                        .value = 1.0 / 255,
-                        .is_default = false,
-                        .knobs = {.splat = {}, .approximation = kFast, .precision = {}}},
-                       {.label = "exact",
-                        .value = kTransmittanceStop,
-                        .is_default = true,
-                        .knobs = {.splat = {}, .approximation = {}, .precision = {}}}}};
-}
-
-// The value is the part of the averted half sphere of directions that is left out.
-Dial averted_dial() {
-  Dial dial{.name = "averted texels",
-            .meaning =
-                "texels are left out, sixteen at a time, whose surface faces away from the camera: "
-                "where the cosine between line of sight and normal is above a bound; the value is "
-                "1 less it",
-            .theoretical_order = std::nullopt,
-            .theory =
-                "A closed surface hides what faces away. What the bound has to allow for is that a "
-                "Gaussian is a disc of some size, seen around the silhouette, and that hair and "
-                "hems are no closed surface.",
-            .reference = {.splat = {}, .approximation = {}, .precision = {}},
-            .stages = {Stage::kSkin, Stage::kDecode, Stage::kProject, Stage::kSort, Stage::kBin,
-                       Stage::kBlend},
-            .settings = {}};
-  for (const float above : {0.0f, 0.1f, 0.25f, 0.5f, 0.75f, 1.0f}) {
-    dial.settings.push_back(
-        {.label = above < 1 ? std::format("{}", above) : "none",
-         .value = 1.0 - double{above},
-         .is_default = above == 1,
-         .knobs = {.splat = {}, .approximation = {.averted_above = above}, .precision = {}}});
-  }
-  return dial;
-}
-
-// Of avatars that have bands above the constant one.
-Dial sh_degree_dial(uint32_t degree) {
-  Dial dial{.name = "SH degree",
-            .meaning =
-                "bands of spherical harmonics above this degree are left out; the value is the "
-                "number of coefficients that stay",
-            .theoretical_order = std::nullopt,
-            .theory = "A band of degree d holds what changes d times around the figure.",
-            .reference = {.splat = {}, .approximation = {}, .precision = {}},
-            .stages = {Stage::kDecode, Stage::kProject},
-            .settings = {}};
-  for (uint32_t d = 0; d <= degree; ++d) {
-    dial.settings.push_back(
-        {.label = std::to_string(d),
-         .value = static_cast<double>(sh_coefficients(d)),
-         .is_default = d == degree,
-         .knobs = {.splat = {}, .approximation = {.sh_degree = d}, .precision = {}}});
-  }
-  return dial;
-}
-
-std::vector<Dial> dials(bool both_precisions, uint32_t sh_degree) {
-  std::vector<Dial> table = {alpha_cut_dial(), blend_dial(), averted_dial()};
-  if (sh_degree > 0) table.push_back(sh_degree_dial(sh_degree));
-  if (both_precisions) table.push_back(precision_dial());
-  return table;
-}
 
 struct ReportOptions {
   SceneOptions scene;
@@ -240,10 +85,12 @@ class SettingRenderer {
     const std::span<const FrameAvatar> posed =
         used.scene->moves() ? used.scene->pose(frames_[i % frames_.size()]) : used.scene->sway(i);
     // Every setting pays for its network, whichever drew the pose before it.
+    LeaveOut leave_out = knobs.leave_out;
+    leave_out.unchanged_networks = false;
     return used.renderer->render({.camera = cameras_[i % cameras_.size()],
                                   .avatars = posed,
                                   .splat = knobs.splat,
-                                  .leave_out = {.unchanged_networks = false},
+                                  .leave_out = leave_out,
                                   .approximation = knobs.approximation},
                                  picture.target());
   }
@@ -254,8 +101,11 @@ class SettingRenderer {
     const uint64_t start_ns =
         ports::now_ns();  // timed by itself, into the 8-bit picture that a user sees
     FIG_RETURN_IF_ERROR(draw(i, setting.knobs, u8));
-    result.log.add(renderer_of(setting.knobs).renderer->statistics(), ports::now_ns() - start_ns);
+    result.log.add(statistics(setting.knobs), ports::now_ns() - start_ns);
     return {};
+  }
+  const FrameStatistics& statistics(const Knobs& knobs) {
+    return renderer_of(knobs).renderer->statistics();
   }
   ImageSize size() const { return {cameras_[0].width_px, cameras_[0].height_px}; }
 
@@ -268,6 +118,62 @@ class SettingRenderer {
   std::vector<uint32_t> frames_;
   std::vector<Camera> cameras_;
 };
+
+// A setting of a dial whose pictures depend on the frames before: one renderer for pictures that
+// are held against the truth and one that is timed, because a pose drawn twice counts twice.
+struct SequenceRenderers {
+  SettingRenderer pictures, timed;
+};
+
+FrameStatistics mean_of(std::span<const FrameStatistics> frames) {
+  FrameStatistics mean;
+  const auto take = [&](auto member) {
+    uint64_t sum = 0;
+    for (const FrameStatistics& frame : frames) sum += frame.*member;
+    mean.*member = sum / frames.size();
+  };
+  for (size_t s = 0; s < kStageCount; ++s) {
+    for (const FrameStatistics& frame : frames) mean.stage_ns[s] += frame.stage_ns[s];
+    mean.stage_ns[s] /= frames.size();
+  }
+  for (const auto member :
+       {&FrameStatistics::gaussians, &FrameStatistics::visible, &FrameStatistics::pairs,
+        &FrameStatistics::blends, &FrameStatistics::macs})
+    take(member);
+  return mean;
+}
+
+// Frames 0, 1, ... of the renderers: first one sequence that nobody looks at, in which every
+// setting gets a past; then count frames, of which each sequence is one entry of a log.
+Status measure_sequences(const Dial& dial, SettingRenderer& reference,
+                         std::span<SequenceRenderers> settings, uint32_t count,
+                         std::vector<Measurement>& results) {
+  RenderedFrame truth(reference.size(), PixelFormat::kRgbaF32),
+      f32(reference.size(), PixelFormat::kRgbaF32), u8(reference.size(), PixelFormat::kRgba8);
+  std::vector<std::vector<FrameStatistics>> statistics(settings.size());
+  std::vector<uint64_t> total_ns(settings.size(), 0);
+  for (uint32_t i = 0; i < dial.sequence + count; ++i) {
+    FIG_RETURN_IF_ERROR(reference.draw(i, dial.reference, truth));
+    for (size_t turn = 0; turn < settings.size(); ++turn) {
+      FIG_RETURN_IF_ERROR(check_interrupt());
+      const size_t s = (i + turn) % settings.size();
+      const Knobs& knobs = dial.settings[s].knobs;
+      FIG_RETURN_IF_ERROR(settings[s].pictures.draw(i, knobs, f32));
+      const uint64_t start_ns = ports::now_ns();
+      FIG_RETURN_IF_ERROR(settings[s].timed.draw(i, knobs, u8));
+      const uint64_t frame_ns = ports::now_ns() - start_ns;
+      if (i < dial.sequence) continue;
+      add_foreground_error(truth.f32, f32.f32, results[s].error);
+      statistics[s].push_back(settings[s].timed.statistics(knobs));
+      total_ns[s] += frame_ns;
+      if (statistics[s].size() < dial.sequence) continue;
+      results[s].log.add(mean_of(statistics[s]), total_ns[s] / dial.sequence);
+      statistics[s].clear();
+      total_ns[s] = 0;
+    }
+  }
+  return {};
+}
 
 struct Box {
   uint32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
@@ -383,6 +289,34 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
   return json;
 }
 
+// Measures a dial whose settings need consecutive frames, over rounds of its sequence.
+Status run_sequences(const ReportOptions& options, const RendererOptions& renderer_options,
+                     const CameraPathOptions& camera_path, const Dial& dial, uint32_t rounds,
+                     std::vector<Measurement>& results) {
+  const auto make = [&]() -> Result<SettingRenderer> {
+    Result<SceneRenderer> made =
+        make_scene_renderer(options.scene, renderer_options, options.device.network_precision());
+    if (!made.ok()) return made.status();
+    Result<std::vector<uint32_t>> frames = made->scene->frames({});
+    if (!frames.ok()) return frames.status();
+    Result<std::vector<Camera>> cameras =
+        make_camera_path(camera_path, *frames, *made->scene, *made->renderer);
+    if (!cameras.ok()) return cameras.status();
+    return SettingRenderer(std::move(*made), SceneRenderer{}, std::move(*frames),
+                           std::move(*cameras));
+  };
+  Result<SettingRenderer> reference = make();
+  if (!reference.ok()) return reference.status();
+  std::vector<SequenceRenderers> settings;
+  for (size_t s = 0; s < dial.settings.size(); ++s) {
+    Result<SettingRenderer> pictures = make(), timed = make();
+    if (!pictures.ok()) return pictures.status();
+    if (!timed.ok()) return timed.status();
+    settings.push_back({std::move(*pictures), std::move(*timed)});
+  }
+  return measure_sequences(dial, *reference, settings, rounds * dial.sequence, results);
+}
+
 Status run_report(const ReportOptions& options) {
   // Whatever else it is, or is not, is said by what loads an avatar.
   if (const auto loaded = load_package(options.scene.avatars[0]);
@@ -439,6 +373,7 @@ Status run_report(const ReportOptions& options) {
   Progress progress("report", options.frames);
   for (uint32_t i = 0; i < options.frames; ++i) {
     for (size_t d = 0; d < table.size(); ++d) {
+      if (table[d].sequence > 1) continue;
       FIG_RETURN_IF_ERROR(drawing.draw(i, table[d].reference, truth));
       const size_t count = table[d].settings.size();
       for (size_t turn = 0; turn < count; ++turn) {  // another setting begins each round: nobody is
@@ -450,6 +385,12 @@ Status run_report(const ReportOptions& options) {
       }
     }
     progress.update(i + 1);
+  }
+  for (size_t d = 0; d < table.size(); ++d) {
+    if (table[d].sequence == 1) continue;
+    const uint32_t rounds = (options.frames + table[d].sequence - 1) / table[d].sequence;
+    FIG_RETURN_IF_ERROR(
+        run_sequences(options, *renderer_options, camera_path, table[d], rounds, measurements[d]));
   }
 
   nlohmann::ordered_json json = json_header("report");
@@ -468,7 +409,8 @@ Status run_report(const ReportOptions& options) {
       "frames; largest is the largest difference of one value there";
   json["timing"] =
       "median over the frames, settings taking turns within each frame; every frame has a fresh "
-      "pose and a run of the network";
+      "pose and a run of the network, but for the dial of the network's interval: there medians "
+      "are over means of eight frames in a row";
   json["dials"] = nlohmann::ordered_json::array();
   for (size_t d = 0; d < table.size(); ++d)
     json["dials"].push_back(dial_json(table[d], measurements[d]));

@@ -1,6 +1,6 @@
 """What a frame costs beside what it cost before, by instruction set, threads and tier.
 
-    scripts/run python3 scripts/experiments/speed.py BEFORE AFTER [OUTPUT]
+    scripts/run python3 scripts/experiments/speed.py BEFORE AFTER [--peers SPLAT_PEERS] [-o OUTPUT]
 
 BEFORE and AFTER are checkouts with a build of `figurine` in build/release; each draws the person
 that it ships (512x512, its golden pose swaying: a fresh pose and a run of the network a frame), and
@@ -9,10 +9,16 @@ take turns, ROUNDS times. Writes the medians over rounds of each run's medians t
 (docs/results/speed.json), prints them, and holds the pictures of the capsules against each other;
 about a minute and a half on idle CPUs. FIGURINE_BIND=FOLDER shows scripts/run a checkout elsewhere.
 
+SPLAT_PEERS is a build of tests/bench/peers, which then draws the capsules by other splatters and by
+this one, taking turns: "peers". What other scripts of this folder have measured of the same person,
+what is left out, the network beside other runtimes, instructions on ARM, is taken over from their
+files where they are there, with where and when it was measured.
+
 What XNNPACK runs does not depend on --isa, which limits figurine's own kernels: every row has its
 time without the network beside it.
 """
 
+import argparse
 import json
 import os
 import pathlib
@@ -134,13 +140,44 @@ def summary_of(rows):
     return summary | {"first_frame_ms": first}
 
 
+def splat_peers(program, folder):
+    """Other splatters on the capsules, and this one: medians of repetitions that take turns."""
+    command = [program, pathlib.Path(folder, "capsules.ply"), "--benchmark_format=json"]
+    command += ["--benchmark_enable_random_interleaving=true", "--benchmark_repetitions=9"]
+    command += ["--benchmark_report_aggregates_only=true", "--benchmark_min_time=0.05s"]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    rows = [
+        {"name": entry["run_name"].split("/iterations")[0], "ms": entry["real_time"]}
+        | {"psnr_db": entry.get("psnr_db") or None}
+        for entry in json.loads(done.stdout)["benchmarks"]
+        if entry["aggregate_name"] == "median"
+    ]
+    fastest = min(row["ms"] for row in rows if row["name"].startswith("figurine/"))
+    return [row | {"times_figurine": row["ms"] / fastest} for row in rows]
+
+
+def measured_elsewhere(name, *keys):
+    """Parts of another report of this folder, and where they are from; nothing if it is not there."""
+    path = pathlib.Path("docs/results", f"{name}.json")
+    if not path.exists():
+        return {}
+    report = json.loads(path.read_text())
+    kept = ("command", "commit", "date", "machine", *keys)
+    return {key: report[key] for key in kept if key in report}
+
+
 def main():
-    if len(sys.argv) not in (3, 4):
-        sys.exit("usage: speed.py BEFORE AFTER [OUTPUT]")
-    output = pathlib.Path(sys.argv[3] if len(sys.argv) == 4 else "docs/results/speed.json")
-    load, seen, cpu = os.getloadavg()[0], {}, ""
+    parser = argparse.ArgumentParser(prog="speed.py", allow_abbrev=False)
+    parser.add_argument("before")
+    parser.add_argument("after")
+    parser.add_argument("--peers", metavar="SPLAT_PEERS")
+    parser.add_argument("-o", "--output", type=pathlib.Path, default="docs/results/speed.json")
+    arguments = parser.parse_args()
+    load, seen, cpu, peers = os.getloadavg()[0], {}, "", []
     with tempfile.TemporaryDirectory() as folder:
-        table = cases(sys.argv[1], sys.argv[2], folder)
+        table = cases(arguments.before, arguments.after, folder)
+        if arguments.peers:
+            peers = splat_peers(arguments.peers, folder)
         order = list(table)
         for turn in range(ROUNDS):
             for key in order if turn % 2 == 0 else reversed(order):
@@ -166,16 +203,21 @@ def main():
             for path in sorted(pathlib.Path(folder).glob("*.pfm"))
             if path.stem in ("baseline", "neon", "sse41", "avx2", "avx512")
         }
-    report = results.head("scripts/experiments/speed.py BEFORE AFTER")
+    arm = measured_elsewhere("arm_instructions", "summary")
+    report = results.head("scripts/experiments/speed.py BEFORE AFTER --peers SPLAT_PEERS")
     report |= {
         "machine": {"cpu": cpu, "cpus": len(os.sched_getaffinity(0)), "load_before": load},
         "before": os.environ.get("FIGURINE_BEFORE", "unknown"),
         "rounds": ROUNDS,
-        "summary": summary_of(rows),
+        "summary": summary_of(rows) | arm.get("summary", {}),
         "capsules_psnr_to_before_db": pictures,  # null: equal to the bit
         "rows": rows,
+        "peers": {"splat": peers, "network": measured_elsewhere("network_peers", "rows")},
+        "arm_instructions": arm,
+        "left_out": measured_elsewhere("left_out", "rows"),
+        "crowd": measured_elsewhere("crowd", "rows"),
     }
-    results.write(output, report)
+    results.write(arguments.output, report)
 
 
 if __name__ == "__main__":

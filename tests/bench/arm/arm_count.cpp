@@ -19,7 +19,7 @@
 
 #include "bench/arm/guest.h"
 #include "bench/arm/instruction_clock.h"
-#include "bench/arm/network_profile.h"
+#include "bench/network_profile.h"
 #include "figurine/renderer.h"
 #include "samples/common/camera_path.h"
 #include "samples/common/rendered_frame.h"

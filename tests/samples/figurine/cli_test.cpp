@@ -471,7 +471,7 @@ TEST_F(Cli, ReportHasADialOfPrecisionsWhereThereAreTwo) {
   const ProgramRun result = run("report P/both.fgn --motion P/motion.fgn --frames 2 --json -o r");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json json = Json::parse(result.out);
-  ASSERT_EQ(json["dials"].size(), 4u);
+  ASSERT_EQ(json["dials"].size(), 6u);
   const Json& averted = json["dials"][2];
   EXPECT_EQ(averted["name"], "averted texels");
   EXPECT_TRUE(averted["settings"].back()["psnr_db"].is_null()) << "nothing left out";
@@ -480,7 +480,7 @@ TEST_F(Cli, ReportHasADialOfPrecisionsWhereThereAreTwo) {
   EXPECT_EQ(tiers[0]["label"], "fast");
   EXPECT_GT(tiers[0]["psnr_db"], 40);
   EXPECT_TRUE(tiers[1]["psnr_db"].is_null()) << "the exact blend is the reference";
-  const Json& settings = json["dials"][3]["settings"];
+  const Json& settings = json["dials"][5]["settings"];
   ASSERT_EQ(settings.size(), 2u);
   EXPECT_EQ(settings[0]["label"], "q8");
   EXPECT_GT(settings[0]["psnr_db"], 20);
@@ -489,7 +489,34 @@ TEST_F(Cli, ReportHasADialOfPrecisionsWhereThereAreTwo) {
   EXPECT_NE(folder_.read("r/report.html").find("Precision"), std::string::npos);
   EXPECT_EQ(json["machine"]["precision"], "q8");
   ASSERT_EQ(run("report P/both.fgn --precision q8 --frames 1 -o r").exit_code, 0);
-  EXPECT_EQ(Json::parse(folder_.read("r/report.json"))["dials"].size(), 3u);
+  EXPECT_EQ(Json::parse(folder_.read("r/report.json"))["dials"].size(), 5u);
+}
+
+TEST_F(Cli, ReportHasDialsOfExactOmissionsAndOfTheNetworksInterval) {
+  const ProgramRun result = run("report P/fixed.fgn --motion P/motion.fgn --frames 9 --json -o r");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = Json::parse(result.out);
+  const Json& omissions = json["dials"][3];
+  ASSERT_EQ(omissions["name"], "exact omissions");
+  for (const Json& setting : omissions["settings"])
+    EXPECT_TRUE(setting["psnr_db"].is_null()) << setting;
+  EXPECT_GT(omissions["settings"].front()["work"]["pairs"],
+            omissions["settings"].back()["work"]["pairs"]);
+  const Json& intervals = json["dials"][4];
+  ASSERT_EQ(intervals["name"], "network interval");
+  ASSERT_EQ(intervals["settings"].size(), 4u);
+  double before_db = 0;
+  for (const Json& setting : intervals["settings"]) {  // one of 8, 4, 2; every pose
+    const double interval = setting["value"];
+    if (interval == 1) {
+      EXPECT_TRUE(setting["psnr_db"].is_null()) << setting;
+      continue;
+    }
+    EXPECT_GT(setting["psnr_db"], before_db) << setting;
+    before_db = setting["psnr_db"];
+    const double every = intervals["settings"].back()["work"]["macs"];
+    EXPECT_NEAR(setting["work"]["macs"], every / interval, 1) << setting;
+  }
 }
 
 TEST_F(Cli, EveryCommandTakesAPrecision) {

@@ -1,8 +1,8 @@
-#include "bench/arm/network_profile.h"
+#include "bench/network_profile.h"
 
 #include <xnnpack.h>
 
-#include "bench/arm/instruction_clock.h"
+#include "bench/profile_clock.h"
 #include "figurine/check.h"
 
 namespace figurine::bench {
@@ -75,7 +75,7 @@ Result<std::vector<LayerCost>> last_run(const Network& network) {
     if (i == 0) {
       cost.count = run.begin - run.stage_begin;
     } else if (i + 1 == network.layers.size()) {
-      // What XNNPACK does besides its operators is a few hundred instructions.
+      // With what XNNPACK does besides its operators, a few hundred instructions.
       cost.count = run.stage_end - run.begin - in_operators;
     } else {
       // A concatenation is two copies.
