@@ -15,11 +15,17 @@ constexpr size_t kFramingFrames = 5;  // posed to see how large the figures are
 constexpr std::array<double, 3> kFollowSigma_s{0.4, 0.2, 0.2};
 constexpr float kOpacitySeen =
     0.05f;  // fainter Gaussians do not decide what must be in the picture
+constexpr size_t kTurntableViews = 8;   // looked at for a distance from which all fit
 constexpr float kDefaultTurn_deg = 25;  // a three-quarter view shows more shape than a frontal one
 // Of body, bust and head. Close-ups are level with the eyes, and from as far as somebody across a
 // table: nearer, a nose grows.
 constexpr std::array<float, 3> kDefaultElevation_deg{6, 0, 0};
 constexpr std::array<float, 3> kDefaultFov_deg{35, 25, 20};
+
+// Of view i of count that go round once.
+float turn_deg(size_t i, size_t count) {
+  return 360 * static_cast<float>(i) / static_cast<float>(count);
+}
 
 // What is followed: in each frame the mean place of everybody's root joint on the ground, or of
 // everybody's head.
@@ -108,6 +114,10 @@ Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
                                              Renderer& renderer) {
   const Camera& golden = scene.avatar(0).avatar.golden.camera;
   if (options.camera.fixed) {
+    if (options.turntable) {
+      return Status(StatusCode::kInvalidArgument,
+                    "turntable: a camera from a file stays where it is; give one or the other");
+    }
     const Result<Camera> camera = fixed_camera(options, golden);
     if (!camera.ok()) return camera.status();
     return std::vector<Camera>(frames.size(), *camera);
@@ -123,11 +133,12 @@ Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
   const double aspect = static_cast<double>(size.width_px) / size.height_px;
   std::vector<Point> path(frames.size(),
                           {0, 0, 0});  // an orbit that stays sees the path in world coordinates
-  if (options.follow)
+  if (options.follow) {
+    const double rate = options.frames_per_second.value_or(
+        scene.frames_per_second() / (frames.size() > 1 ? frames[1] - frames[0] : 1));
     path = smooth_path(figures_path(frames, options.framing, scene),
-                       kFollowSigma_s[static_cast<size_t>(options.framing)] *
-                           scene.frames_per_second() /
-                           (frames.size() > 1 ? frames[1] - frames[0] : 1));
+                       kFollowSigma_s[static_cast<size_t>(options.framing)] * rate);
+  }
   const Result<std::vector<Point>> points =
       sample_points(frames, path, options.framing, scene, renderer);
   if (!points.ok()) return points.status();
@@ -144,10 +155,17 @@ Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
     orbit.elevation_deg = kDefaultElevation_deg[static_cast<size_t>(options.framing)];
     orbit.vertical_fov_deg = kDefaultFov_deg[static_cast<size_t>(options.framing)];
     orbit.distance_m = fit_distance_m(*points, orbit, aspect, framing);
+    for (size_t i = 1; options.turntable && i < kTurntableViews; ++i) {
+      OrbitCamera turned = orbit;
+      turned.azimuth_deg += turn_deg(i, kTurntableViews);
+      orbit.distance_m =
+          std::max(orbit.distance_m, fit_distance_m(*points, turned, aspect, framing));
+    }
   }
   std::vector<Camera> cameras;
   for (size_t i = 0; i < frames.size(); ++i) {
     OrbitCamera here = orbit;
+    if (options.turntable) here.azimuth_deg += turn_deg(i, frames.size());
     for (size_t k = 0; k < 3; ++k) here.target_m[k] += path[i][k];
     Result<Camera> camera = make_orbit_camera(here, size.width_px, size.height_px);
     if (!camera.ok()) return camera.status();

@@ -20,11 +20,15 @@ struct CameraPathOptions {
   bool follow = true;  // orbit cameras move with the figures' smoothed path; otherwise they see the
                        // whole path from one place
   std::optional<float> near_m;
+  // What the frames are shown at, for how fast an orbit follows; without: by their distance in the
+  // motion.
+  std::optional<double> frames_per_second;
+  bool turntable = false;  // an orbit goes round once in all frames
 };
 
-// kUnsupported for a close-up of a body without a head joint, kInvalidArgument for one with a
-// camera that a file fixes. The scene must have been added to the renderer, which poses it in a few
-// frames to see how large it is. frames is not empty.
+// kUnsupported for a close-up of a body without a head joint, kInvalidArgument for one, or
+// a turntable, with a camera that a file fixes. The scene must have been added to the renderer,
+// which poses it in a few frames to see how large it is. frames is not empty.
 Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
                                              std::span<const uint32_t> frames, Scene& scene,
                                              Renderer& renderer);

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 
-#include "ports/host/files.h"
-#include "ports/media/png.h"
-#include "samples/common/rendered_frame.h"
+#include "samples/common/file_sink.h"
 
 namespace figurine::samples {
 
@@ -78,10 +76,7 @@ void ContactSheet::offer(uint32_t index, const ports::ImageU8& frame) {
 }
 
 Status ContactSheet::write(const std::string& path, bool opaque) const {
-  const Result<std::vector<std::byte>> bytes =
-      ports::encode_png(opaque ? drop_alpha(sheet_) : sheet_);
-  if (!bytes.ok()) return bytes.status();
-  return ports::write_file_atomically(path, *bytes);
+  return write_picture(path, sheet_, opaque);
 }
 
 }  // namespace figurine::samples

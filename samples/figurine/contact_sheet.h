@@ -26,7 +26,7 @@ class ContactSheet {
 
   // Frame number index of the sequence, RGBA with straight alpha; taken if it is one of the chosen.
   void offer(uint32_t index, const ports::ImageU8& frame);
-  // PNG; without alpha if opaque.
+  // .png, without alpha if opaque, or .jpg, by the name (write_picture).
   Status write(const std::string& path, bool opaque) const;
 
  private:

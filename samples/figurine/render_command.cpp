@@ -1,7 +1,10 @@
 // figurine render: avatars, posed by a motion, into images or video.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "ports/host/clock.h"
 #include "samples/common/camera_path.h"
@@ -14,6 +17,7 @@
 #include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
 #include "samples/figurine/contact_sheet.h"
+#include "samples/figurine/shown_frames.h"
 
 namespace figurine::samples {
 
@@ -26,42 +30,75 @@ struct RenderOptions {
   std::string frames, camera, size, background, follow = "smooth", framing = "body";
   std::optional<float> near_m;
   std::optional<double> frames_per_second;
-  std::string output, contact_sheet;
+  std::vector<std::string> outputs;
+  std::string contact_sheet;
+  std::optional<uint32_t> turntable;
   ContactSheet::Options sheet;
 };
-
-constexpr std::array<float, 3> kVideoBackground{
-    0.86f, 0.88f, 0.90f};  // a light, slightly cool grey: dark and light clothes stand out
 
 // Everything that the command line said, checked and loaded.
 struct Job {
   Scene scene;
-  std::vector<uint32_t> frames;
+  ShownFrames shown;
   CameraPathOptions camera_path;
   std::optional<std::array<float, 3>> background;
-  double frames_per_second = 30;
 };
 
+bool any_of(const std::vector<std::string>& outputs, bool (*is)(const std::string&)) {
+  return std::any_of(outputs.begin(), outputs.end(), is);
+}
+
+// Nothing is written over something else that this command writes. By names: two of one file are
+// not found out.
+Status check_names(const RenderOptions& options, std::span<const uint32_t> frames) {
+  std::set<std::string> names;
+  const auto is_new = [&](const std::string& name) {
+    return names.insert(std::filesystem::path(name).lexically_normal().string()).second;
+  };
+  for (const std::string& output : options.outputs) {
+    const Result<NumberedName> numbered = NumberedName::parse(output);
+    if (!numbered.ok()) return numbered.status();
+    if (!numbered->numbered() && !is_new(output))
+      return Status(StatusCode::kInvalidArgument, output + ": is written twice");
+    for (const uint32_t frame : frames) {
+      if (!numbered->numbered() || is_new(numbered->name(frame))) continue;
+      return Status(StatusCode::kInvalidArgument,
+                    numbered->name(frame) +
+                        ": is written twice; with --fps above the motion's, frames repeat");
+    }
+  }
+  if (options.contact_sheet.empty()) return {};
+  FIG_RETURN_IF_ERROR(check_picture_name(options.contact_sheet));
+  if (is_new(options.contact_sheet)) return {};
+  return Status(StatusCode::kInvalidArgument,
+                options.contact_sheet + ": the contact sheet would take the result's place");
+}
+
 Result<Job> prepare(const RenderOptions& options) {
-  if (options.output.empty() && options.contact_sheet.empty()) {
+  if (options.outputs.empty() && options.contact_sheet.empty()) {
     return Status(StatusCode::kInvalidArgument,
                   "render: nothing to write; give -o or --contact-sheet");
   }
-  if (options.output.starts_with("/dev/video")) {
+  for (const std::string& output : options.outputs) {
+    if (!output.starts_with("/dev/video")) continue;
     return Status(StatusCode::kUnsupported,
-                  options.output + ": video devices are unsupported in this build");
+                  output + ": video devices are unsupported in this build");
   }
   Result<Background> background =
       parse_background(options.background.empty() ? "alpha" : options.background);
   if (!background.ok()) return background.status();
-  if (options.background.empty() && is_video_name(options.output))
-    background->colour = kVideoBackground;
+  if (options.background.empty() &&
+      (any_of(options.outputs, needs_background) || needs_background(options.contact_sheet))) {
+    background->colour = kPlainBackground;
+  }
 
   Result<Scene> scene = Scene::load(options.scene);
   if (!scene.ok()) return scene.status();
   // One image of a motion is its first frame, unless a frame is named; a sequence is all of it.
-  const bool one_image = options.output.find('%') == std::string::npos &&
-                         !is_video_name(options.output) && options.contact_sheet.empty();
+  const auto is_sequence = [](const std::string& output) {
+    return output.find('%') != std::string::npos || is_video_name(output);
+  };
+  const bool one_image = options.contact_sheet.empty() && !any_of(options.outputs, is_sequence);
   const Result<FrameRange> range = parse_frames(!options.frames.empty() ? options.frames
                                                 : one_image             ? "0"
                                                                         : ":");
@@ -69,7 +106,16 @@ Result<Job> prepare(const RenderOptions& options) {
   Result<std::vector<uint32_t>> frames = scene->frames(*range);
   if (!frames.ok()) return frames.status();
 
-  CameraPathOptions camera_path{.follow = options.follow == "smooth", .near_m = options.near_m};
+  const double rate_hz = scene->frames_per_second() / range->step;
+  ShownFrames shown =
+      options.turntable
+          ? turntable_frames(*frames, rate_hz, options.frames_per_second, *options.turntable)
+          : frames_in_time(*frames, rate_hz, options.frames_per_second);
+
+  CameraPathOptions camera_path{.follow = options.follow == "smooth",
+                                .near_m = options.near_m,
+                                .frames_per_second = shown.frames_per_second,
+                                .turntable = options.turntable.has_value()};
   if (!options.size.empty()) {
     const Result<ImageSize> size = parse_size(options.size);
     if (!size.ok()) return size.status();
@@ -83,9 +129,7 @@ Result<Job> prepare(const RenderOptions& options) {
     if (!camera.ok()) return camera.status();
     camera_path.camera = *camera;
   }
-  const double rate = options.frames_per_second.value_or(scene->frames_per_second() / range->step);
-  return Job{std::move(*scene), std::move(*frames), std::move(camera_path), background->colour,
-             rate};
+  return Job{std::move(*scene), std::move(shown), std::move(camera_path), background->colour};
 }
 
 Status run_render(const RenderOptions& options) {
@@ -98,22 +142,32 @@ Status run_render(const RenderOptions& options) {
   if (!renderer.ok()) return renderer.status();
   FIG_RETURN_IF_ERROR(job->scene.add_to(**renderer, options.device.network_precision()));
   const Result<std::vector<Camera>> cameras =
-      make_camera_path(job->camera_path, job->frames, job->scene, **renderer);
+      make_camera_path(job->camera_path, job->shown.frames, job->scene, **renderer);
   if (!cameras.ok()) return cameras.status();
   const ImageSize size{cameras->front().width_px, cameras->front().height_px};
-  const auto frame_count = static_cast<uint32_t>(job->frames.size());
+  const auto frame_count = static_cast<uint32_t>(job->shown.frames.size());
   const bool opaque = job->background.has_value();
 
-  std::unique_ptr<FileSink> sink;
-  if (!options.output.empty()) {
+  // A turn's pictures are numbered by themselves, others as the motion numbers them.
+  const auto number = [&](uint32_t i) { return options.turntable ? i : job->shown.frames[i]; };
+  std::vector<uint32_t> numbers(frame_count);
+  for (uint32_t i = 0; i < frame_count; ++i) numbers[i] = number(i);
+  FIG_RETURN_IF_ERROR(check_names(options, numbers));
+  std::vector<std::unique_ptr<FileSink>> sinks;
+  for (const std::string& output : options.outputs) {
     Result<std::unique_ptr<FileSink>> created =
-        FileSink::create(options.output, {.size = size,
-                                          .frame_count = frame_count,
-                                          .frames_per_second = job->frames_per_second,
-                                          .opaque = opaque});
+        FileSink::create(output, {.size = size,
+                                  .frame_count = frame_count,
+                                  .frames_per_second = job->shown.frames_per_second,
+                                  .opaque = opaque});
     if (!created.ok()) return created.status();
-    sink = std::move(*created);
+    sinks.push_back(std::move(*created));
+    if (sinks.back()->format() != sinks.front()->format()) {
+      return Status(StatusCode::kInvalidArgument,
+                    output + ": floats and 8 bits are not written at once");
+    }
   }
+  const PixelFormat format = sinks.empty() ? PixelFormat::kRgba8 : sinks.front()->format();
   std::optional<ContactSheet> sheet;
   if (!options.contact_sheet.empty()) {
     ContactSheet::Options sheet_options = options.sheet;
@@ -122,15 +176,17 @@ Status run_render(const RenderOptions& options) {
     Result<ContactSheet> created = ContactSheet::create(sheet_options);
     if (!created.ok()) return created.status();
     sheet = std::move(*created);
-    if (sink && sink->format() != PixelFormat::kRgba8) {
-      return Status(
-          StatusCode::kUnsupported,
-          options.output + ": a contact sheet is made beside 8-bit images or video, not .pfm");
+    if (format != PixelFormat::kRgba8) {
+      return Status(StatusCode::kUnsupported,
+                    options.outputs.front() +
+                        ": a contact sheet is made beside 8-bit images or video, not .pfm");
     }
   }
 
-  const Approximation approximation = options.omissions.approximation(job->frames_per_second);
-  RenderedFrame frame(size, sink ? sink->format() : PixelFormat::kRgba8);
+  if (!job->shown.note.empty())
+    std::fprintf(stderr, "figurine: render: %s\n", job->shown.note.c_str());
+  const Approximation approximation = options.omissions.approximation(job->shown.frames_per_second);
+  RenderedFrame frame(size, format);
   FrameLog log;
   Progress progress("render", frame_count);
   const uint64_t start_ns = ports::now_ns();
@@ -138,24 +194,25 @@ Status run_render(const RenderOptions& options) {
     FIG_RETURN_IF_ERROR(check_interrupt());
     const uint64_t frame_start_ns = ports::now_ns();
     FIG_RETURN_IF_ERROR((*renderer)->render({.camera = (*cameras)[i],
-                                             .avatars = job->scene.pose(job->frames[i]),
+                                             .avatars = job->scene.pose(job->shown.frames[i]),
                                              .background = job->background,
                                              .leave_out = options.omissions.leave_out(),
                                              .approximation = approximation},
                                             frame.target()));
     log.add((*renderer)->statistics(), ports::now_ns() - frame_start_ns);
-    if (sink) FIG_RETURN_IF_ERROR(sink->add(frame));
+    for (const auto& sink : sinks) FIG_RETURN_IF_ERROR(sink->add(frame, numbers[i]));
     if (sheet) sheet->offer(i, frame.u8);
     progress.update(i + 1);
   }
-  if (sink) FIG_RETURN_IF_ERROR(sink->finish());
+  for (const auto& sink : sinks) FIG_RETURN_IF_ERROR(sink->finish());
   if (sheet) FIG_RETURN_IF_ERROR(sheet->write(options.contact_sheet, opaque));
   const double wall_s = static_cast<double>(ports::now_ns() - start_ns) * 1e-9;
 
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("render");
     json["avatars"] = options.scene.avatars;
-    json["output"] = options.output;
+    json["output"] = options.outputs.empty() ? "" : options.outputs.front();
+    if (options.outputs.size() > 1) json["outputs"] = options.outputs;
     if (sheet) json["contact_sheet"] = options.contact_sheet;
     json["frames"] = frame_count;
     json["size"] = {size.width_px, size.height_px};
@@ -229,10 +286,16 @@ Command add_render_command(CLI::App& app) {
                       "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha for images");
   command
       ->add_option("--fps", options->frames_per_second,
-                   "frames a second of the video; default: the motion's, divided by STEP")
+                   "frames a second, in real time: of a faster motion frames are left out, of a "
+                   "slower one repeated; default: the motion's, divided by STEP")
       ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--turntable", options->turntable,
+                   "N frames in which an orbit goes round once; the motion starts again where it "
+                   "ends, and one frame (--frames 7) stands still")
+      ->check(CLI::Range(2u, 100000u));
   command->add_option("--contact-sheet", options->contact_sheet,
-                      "also put evenly chosen frames into one PNG");
+                      "also put evenly chosen frames into one .png or .jpg");
   command->add_option("--columns", options->sheet.columns, "of the contact sheet")
       ->check(CLI::Range(1u, 100u))
       ->capture_default_str();
@@ -242,7 +305,12 @@ Command add_render_command(CLI::App& app) {
   command->add_option("--sheet-shrink", options->sheet.shrink, "tiles are 1/N of a frame")
       ->check(CLI::Range(1u, 64u))
       ->capture_default_str();
-  command->add_option("-o,--output", options->output, "x.png, x_%04d.png, x.pfm, x.y4m or x.mp4");
+  command
+      ->add_option("-o,--output", options->outputs,
+                   "x.png, x_%04d.png (numbered as the motion's frames), .jpg or .pfm; x.webp, "
+                   "x.mp4, x.webm, x.gif or x.y4m; several are written at once")
+      ->expected(1)
+      ->take_all();
   options->device.add_to(*command);
   options->omissions.add_to(*command);
   return {command, [options] { return run_render(*options); }};

@@ -10,18 +10,17 @@ namespace figurine::samples {
 namespace {
 
 Dial alpha_cut_dial() {
-  Dial dial{
-      .name = "alpha cut",
-      .meaning =
-          "contributions to a pixel with an alpha below this are skipped; it decides how far "
-          "around its centre a Gaussian is drawn",
-      .theoretical_order = 1,
-      .theory =
-          "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is "
-          "missing from the picture falls in proportion to the "
-          "cut.",
-      .reference = {.splat = {.alpha_cut = kReferenceCut}},
-      .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve}};
+  Dial dial{.name = "alpha cut",
+            .meaning =
+                "contributions to a pixel with an alpha below this are skipped; it decides how far "
+                "around its centre a Gaussian is drawn",
+            .theoretical_order = 1,
+            .theory =
+                "The part of a 2D Gaussian below a cut a has mass 2 pi sqrt(det) a: what is "
+                "missing from the picture falls in proportion to the "
+                "cut.",
+            .reference = {.splat = {.alpha_cut = kReferenceCut}},
+            .stages = {Stage::kProject, Stage::kBin, Stage::kSort, Stage::kBlend, Stage::kResolve}};
   for (const int inverse : {16, 32, 64, 128, 255, 512, 1024, 4096, 16384}) {
     const double cut = 1.0 / inverse;
     dial.settings.push_back({.label = "1/" + std::to_string(inverse),
@@ -36,26 +35,24 @@ Dial alpha_cut_dial() {
 // difference is the precision's own.
 Dial precision_dial() {
   constexpr SplatOptions kSplat{.alpha_cut = kReferenceCut};
-  return {
-      .name = "precision",
-      .meaning =
-          "arithmetic of the network: q8 (int8 weights and activations) or f32, this dial's "
-          "reference; the value is the step of a "
-          "number that fills its range",
-      .theory =
-          "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the "
-          "layers add their errors up.",
-      .reference = {.splat = kSplat, .precision = Precision::kFloat32},
-      .stages = {Stage::kNetwork},
-      .settings = {
-          {.label = to_string(Precision::kFixedPoint),
-           .value = 0x1p-8,
-           .is_default = true,
-           .knobs = {.splat = kSplat, .precision = Precision::kFixedPoint}},
-          {.label = to_string(Precision::kFloat32),
-           .value = 0x1p-24,
-           .is_default = false,
-           .knobs = {.splat = kSplat, .precision = Precision::kFloat32}}}};
+  return {.name = "precision",
+          .meaning =
+              "arithmetic of the network: q8 (int8 weights and activations) or f32, this dial's "
+              "reference; the value is the step of a "
+              "number that fills its range",
+          .theory =
+              "Rounding a range to 255 steps leaves 59 dB of a value that fills it evenly; the "
+              "layers add their errors up.",
+          .reference = {.splat = kSplat, .precision = Precision::kFloat32},
+          .stages = {Stage::kNetwork},
+          .settings = {{.label = to_string(Precision::kFixedPoint),
+                        .value = 0x1p-8,
+                        .is_default = true,
+                        .knobs = {.splat = kSplat, .precision = Precision::kFixedPoint}},
+                       {.label = to_string(Precision::kFloat32),
+                        .value = 0x1p-24,
+                        .is_default = false,
+                        .knobs = {.splat = kSplat, .precision = Precision::kFloat32}}}};
 }
 
 // At the default's alpha cut: what is left of the difference is the tier's.
@@ -69,14 +66,12 @@ Dial blend_dial() {
               "A pixel that stops at 1/255 of its light is at most that far from the truth; the "
               "cubic in place of 2^x is 7.5e-5 off, relative.",
           .stages = {Stage::kBlend},
-          .settings = {{.label = "fast",
-                        .value = 1.0 / 255,
-                        .is_default = false,
-                        .knobs = {.approximation = kFast}},
-                       {.label = "exact",
-                        .value = kTransmittanceStop,
-                        .is_default = true,
-                        .knobs = {}}}};
+          .settings = {
+              {.label = "fast",
+               .value = 1.0 / 255,
+               .is_default = false,
+               .knobs = {.approximation = kFast}},
+              {.label = "exact", .value = kTransmittanceStop, .is_default = true, .knobs = {}}}};
 }
 
 // The value is the part of the averted half sphere of directions that is left out.
@@ -93,11 +88,10 @@ Dial averted_dial() {
             .stages = {Stage::kSkin, Stage::kDecode, Stage::kProject, Stage::kSort, Stage::kBin,
                        Stage::kBlend}};
   for (const float above : {0.0f, 0.1f, 0.25f, 0.5f, 0.75f, 1.0f}) {
-    dial.settings.push_back(
-        {.label = above < 1 ? std::format("{}", above) : "none",
-         .value = 1.0 - double{above},
-         .is_default = above == 1,
-         .knobs = {.approximation = {.averted_above = above}}});
+    dial.settings.push_back({.label = above < 1 ? std::format("{}", above) : "none",
+                             .value = 1.0 - double{above},
+                             .is_default = above == 1,
+                             .knobs = {.approximation = {.averted_above = above}}});
   }
   return dial;
 }
@@ -111,11 +105,10 @@ Dial sh_degree_dial(uint32_t degree) {
             .theory = "A band of degree d holds what changes d times around the figure.",
             .stages = {Stage::kDecode, Stage::kProject}};
   for (uint32_t d = 0; d <= degree; ++d) {
-    dial.settings.push_back(
-        {.label = std::to_string(d),
-         .value = static_cast<double>(sh_coefficients(d)),
-         .is_default = d == degree,
-         .knobs = {.approximation = {.sh_degree = d}}});
+    dial.settings.push_back({.label = std::to_string(d),
+                             .value = static_cast<double>(sh_coefficients(d)),
+                             .is_default = d == degree,
+                             .knobs = {.approximation = {.sh_degree = d}}});
   }
   return dial;
 }
@@ -131,7 +124,7 @@ Dial omissions_dial() {
                        Stage::kBlend}};
   struct Switch {
     const char* label;
-    bool LeaveOut::*member;
+    bool LeaveOut::* member;
   };
   constexpr Switch kSwitches[] = {{"with hidden texels", &LeaveOut::hidden_texels},
                                   {"with transparent Gaussians", &LeaveOut::transparent},
@@ -140,7 +133,8 @@ Dial omissions_dial() {
                                   {"with stopped tiles", &LeaveOut::stopped}};
   LeaveOut none;
   for (const Switch& each : kSwitches) none.*each.member = false;
-  dial.settings.push_back({.label = "everything computed", .value = 0, .knobs = {.leave_out = none}});
+  dial.settings.push_back(
+      {.label = "everything computed", .value = 0, .knobs = {.leave_out = none}});
   for (const Switch& each : kSwitches) {
     LeaveOut but_one;
     but_one.*each.member = false;

@@ -84,7 +84,7 @@ class Strip final : public AvatarSampler::Trace {
         draw(avatar.avatar(), *body_, Precision::kFixedPoint, isa_);
     if (!picture.ok()) return picture.status();
     sheet_.offer(step - 1, picture->frame.u8);
-    return sink_->add(picture->frame);
+    return sink_->add(picture->frame, step - 1);
   }
 
   Status finish() {

@@ -61,9 +61,11 @@ Status run_splat(const SplatCommandOptions& options) {
   Result<Background> background =
       parse_background(options.background.empty() ? "alpha" : options.background);
   if (!background.ok()) return background.status();
+  if (options.background.empty() && needs_background(options.output))
+    background->colour = kPlainBackground;
   if (!options.output.starts_with("/dev/video") && is_video_name(options.output)) {
     return Status(StatusCode::kUnsupported,
-                  options.output + ": a scene does not move; write .png or .pfm");
+                  options.output + ": a scene does not move; write .png, .jpg or .pfm");
   }
 
   const Result<GaussianCloud> cloud = read_scene(options.scene);
@@ -88,7 +90,7 @@ Status run_splat(const SplatCommandOptions& options) {
        .splat = {.alpha_cut = options.alpha_cut, .antialiased = options.antialiased}},
       frame.target()));
   log.add((*renderer)->statistics(), ports::now_ns() - start_ns);
-  FIG_RETURN_IF_ERROR((*sink)->add(frame));
+  FIG_RETURN_IF_ERROR((*sink)->add(frame, 0));
   FIG_RETURN_IF_ERROR((*sink)->finish());
 
   if (cloud->left_out > 0) {
@@ -145,7 +147,7 @@ Command add_splat_command(CLI::App& app) {
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the camera's, or 1024x768");
   command->add_option("--background", options->background,
                       "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha");
-  command->add_option("-o,--output", options->output, "x.png or x.pfm")->required();
+  command->add_option("-o,--output", options->output, "x.png, x.jpg or x.pfm")->required();
   options->device.add_to(*command);
   return {command, [options] { return run_splat(*options); }};
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The shipped person once more, with fewer texels and a smaller network or none: what a renderer
-# draws of figures too small for more (--coarse). Writes docs/results/coarse.json, and leaves the
-# packages of every row in FOLDER.
+# draws of figures too small for more (--coarse). Leaves a package for each in FOLDER; crowd.py
+# measures them.
 #
 #   scripts/experiments/coarse.sh [FOLDER]
 #
@@ -10,8 +10,7 @@
 # and details follow from what a camera resolved. Trained for iterations, two rows at a time on one
 # core each.
 #
-# Environment: ITERATIONS (3000), SEED (1) of the person, DENSE (samples/packages/person.fgn), the
-# avatar that the rows stand in for.
+# Environment: ITERATIONS (3000), SEED (1) of the person.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
@@ -35,7 +34,9 @@ row() {  # NAME OPTIONS...
   fi
   [ "$run/evaluation.json" -nt "$run/weights.safetensors" ] ||
     train evaluate reconstruction --run "$run" --threads 1 > /dev/null
-  train pack "$run" --precision q8 -o "$folder/$1.fgn"
+  local precision=(--precision q8)
+  [ "$1" != none ] || precision=()
+  train pack "$run" "${precision[@]}" -o "$folder/$1.fgn"
   step "$1 is there"
 }
 row network_32 --network-size 32 --channels 16 &

@@ -157,7 +157,7 @@ def splat_peers(program, folder):
 
 
 def measured_elsewhere(name, *keys):
-    """Parts of another report of this folder, and where they are from; nothing if it is not there."""
+    """Parts of another report of this folder, and where they are from, if it is there."""
     path = pathlib.Path("docs/results", f"{name}.json")
     if not path.exists():
         return {}

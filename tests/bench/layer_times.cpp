@@ -72,12 +72,9 @@ Status print_layers(const std::string& avatar, uint32_t frames) {
     for (const uint64_t ns : statistics.stage_ns) sum_ns += ns;
     frame_ns.push_back(sum_ns);
   }
-  Json json = {{"cpu", samples::cpu_name()},
-               {"isa", to_string((*renderer)->isa())},
-               {"library", network_library()},
-               {"frames", frames},
-               {"network_ms", median_ms(network_ns)},
-               {"frame_ms", median_ms(frame_ns)}};
+  Json json = {{"cpu", samples::cpu_name()},          {"isa", to_string((*renderer)->isa())},
+               {"library", network_library()},        {"frames", frames},
+               {"network_ms", median_ms(network_ns)}, {"frame_ms", median_ms(frame_ns)}};
   for (size_t i = 0; i < layers.size(); ++i) {
     json["layers"].push_back(
         {{"name", layers[i].name}, {"macs", layers[i].macs}, {"ms", median_ms(layer_ns[i])}});

@@ -12,9 +12,9 @@
 #include <filesystem>
 
 #include "ports/host/files.h"
+#include "ports/media/jpeg.h"
 #include "ports/media/png.h"
 #include "toolchain/body/skeleton.h"
-#include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
 
 namespace figurine::capture {
@@ -304,7 +304,9 @@ bool IdentityLayout::has_image(size_t frame, size_t camera) const {
 }
 
 void IdentityLayout::write_image(size_t frame, size_t camera, const Rendering& rendering) const {
-  write_unsynced(image_path(frame, camera), dataset::encode_jpeg(rendering.colour, kJpegQuality));
+  write_unsynced(image_path(frame, camera),
+                 value_or_throw(ports::encode_jpeg(rendering.colour, kJpegQuality),
+                                image_path(frame, camera)));
   write_unsynced(mask_path(frame, camera),
                  value_or_throw(ports::encode_png(rendering.alpha), mask_path(frame, camera)));
 }

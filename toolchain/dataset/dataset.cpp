@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "ports/host/files.h"
+#include "ports/media/jpeg.h"
 #include "ports/media/png.h"
-#include "toolchain/dataset/jpeg.h"
 #include "toolchain/dataset/json_fields.h"
 #include "toolchain/dataset/skeleton_hash.h"
 #include "toolchain/error.h"
@@ -114,7 +114,7 @@ std::map<uint32_t, std::string> numbered_files(const std::string& directory,
 }
 
 Camera read_camera(const JsonField& extrinsics, const std::vector<double>& intrinsics, double scale,
-                   ImageSize size) {
+                   ports::JpegSize size) {
   Camera camera;
   camera.width_px = size.width_px;
   camera.height_px = size.height_px;
@@ -348,7 +348,7 @@ class Dataset::Reading {
         ++set_.cameras_left_out_;
         continue;
       }
-      const ImageSize size = list_images(name);
+      const ports::JpegSize size = list_images(name);
       CaptureCamera camera{name, read_camera(extrinsics[key], intrinsics, scale, size)};
       if (own_) scale_intrinsics(camera.camera);
       check_principal_point(camera, intrinsics_path);
@@ -392,13 +392,15 @@ class Dataset::Reading {
   fs::path image_folder(const std::string& camera) const { return root_ / "images_lr" / camera; }
 
   // Notes a camera's images and masks; the size of the first image.
-  ImageSize list_images(const std::string& camera) {
+  ports::JpegSize list_images(const std::string& camera) {
     const fs::path folder = image_folder(camera);
     images_.push_back(numbered_files(folder.string(), ".jpg"));
     masks_.push_back(numbered_files((root_ / "fmask_lr" / camera).string(), ".png"));
     if (images_.back().empty()) throw InputError(folder.string() + ": no images");
     const std::string first = (folder / images_.back().begin()->second).string();
-    return decode_jpeg_size(map_file(first).bytes(), first);
+    const Result<ports::JpegSize> size = ports::decode_jpeg_size(map_file(first).bytes(), first);
+    if (!size.ok()) throw InputError(size.status().message());
+    return *size;
   }
 
   // The images are half the size that the intrinsics speak of: a principal point outside the image
@@ -576,8 +578,9 @@ CaptureImage Dataset::load_image(size_t frame, size_t camera) const {
                      std::to_string(expected.width_px) + "x" + std::to_string(expected.height_px));
   };
   const std::string colour_path = image_path(frame, camera);
-  ports::ImageU8 colour = decode_jpeg(map_file(colour_path).bytes(), colour_path);
-  check_size(colour_path, colour);
+  Result<ports::ImageU8> colour = ports::decode_jpeg(map_file(colour_path).bytes(), colour_path);
+  if (!colour.ok()) throw InputError(colour.status().message());
+  check_size(colour_path, *colour);
 
   const std::string alpha_path = mask_path(frame, camera);
   const ports::MappedFile mask_file = map_file(alpha_path);
@@ -586,7 +589,7 @@ CaptureImage Dataset::load_image(size_t frame, size_t camera) const {
   const ports::ImageU8& mask = *decoded;
   check_size(alpha_path, mask);
 
-  CaptureImage image{expected.width_px, expected.height_px, std::move(colour.pixels), {}};
+  CaptureImage image{expected.width_px, expected.height_px, std::move(colour->pixels), {}};
   const size_t count = size_t{image.width_px} * image.height_px;
   image.alpha.resize(count);
   for (size_t i = 0; i < count; ++i)

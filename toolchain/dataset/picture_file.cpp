@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "ports/host/files.h"
+#include "ports/media/jpeg.h"
 #include "ports/media/png.h"
-#include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
 
 namespace figurine::dataset {
@@ -27,9 +27,9 @@ void check_picture_name(const std::string& path) {
 
 void write_picture(const std::string& path, const ports::ImageU8& image) {
   check_picture_name(path);
-  const std::vector<std::byte> bytes = extension_of(path) == ".png"
-                                           ? value_or_throw(ports::encode_png(image), path)
-                                           : encode_jpeg(image, kQuality);
+  const std::vector<std::byte> bytes = value_or_throw(
+      extension_of(path) == ".png" ? ports::encode_png(image) : ports::encode_jpeg(image, kQuality),
+      path);
   throw_if_error(ports::write_file_atomically(path, bytes), "cannot save");
 }
 

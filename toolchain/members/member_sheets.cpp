@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "toolchain/dataset/jpeg.h"
+#include "ports/media/jpeg.h"
+#include "toolchain/error.h"
 #include "toolchain/train/opened_member.h"
 
 namespace figurine::members {
@@ -209,7 +210,7 @@ ports::ImageU8 draw_people(const MemberSet& set, const std::vector<RowMatrix>& s
 std::vector<std::byte> encode_sheet(const ports::ImageU8& sheet, size_t max_bytes) {
   std::vector<std::byte> bytes;
   for (int quality = 92; quality >= 60; quality -= 4) {
-    bytes = dataset::encode_jpeg(sheet, quality);
+    bytes = value_or_throw(ports::encode_jpeg(sheet, quality), "a sheet of members");
     if (bytes.size() <= max_bytes) break;
   }
   return bytes;

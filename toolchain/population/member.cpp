@@ -9,8 +9,8 @@
 #include "formats/writer/package_writer.h"
 #include "formats/writer/population_writer.h"
 #include "ports/host/files.h"
+#include "ports/media/jpeg.h"
 #include "toolchain/capture/capture.h"
-#include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/pictures/contact_sheet.h"
@@ -176,9 +176,10 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
     row["log"] = training_log(run);
   }
   save(state.sheet(name),
-       dataset::encode_jpeg(
-           pictures::make_contact_sheet({&avatar}, {.poses = 3, .person_height_px = 320}),
-           kSheetQuality));
+       value_or_throw(ports::encode_jpeg(pictures::make_contact_sheet(
+                                             {&avatar}, {.poses = 3, .person_height_px = 320}),
+                                         kSheetQuality),
+                      state.sheet(name)));
   save(state.member(name), package);
   train::write_json(state.row(name), row);
   clean_up();

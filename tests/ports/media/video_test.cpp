@@ -159,6 +159,42 @@ TEST(VideoWriter, Mp4KeepsColoursAndSizesThroughFfmpeg) {
     ASSERT_NEAR(static_cast<unsigned char>(raw[i]), expected[i % 3], 4) << i;
 }
 
+TEST(VideoWriter, WebmAndGifGoThroughFfmpegWithTheirAlpha) {
+  if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg on this machine";
+  const Folder folder;
+  ImageU8 frame(64, 48, 4);  // a red half that is there, and one that is not
+  for (uint32_t y = 0; y < 48; ++y) {
+    for (uint32_t x = 0; x < 64; ++x) {
+      frame.at(x, y)[0] = 220;
+      frame.at(x, y)[1] = frame.at(x, y)[2] = 30;
+      frame.at(x, y)[3] = x < 32 ? 255 : 0;
+    }
+  }
+  for (const char* name : {"x.webm", "x.GIF"}) {
+    auto writer = VideoWriter::create(
+        folder.path(name), {.width_px = 64, .height_px = 48, .rate = {25, 1}, .alpha = true});
+    ASSERT_TRUE(writer.ok()) << writer.status().message();
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE((*writer)->add(frame).ok());
+    const Status status = (*writer)->finish();
+    ASSERT_TRUE(status.ok()) << status.message();
+    const std::string raw = folder.path(std::string(name) + ".raw");
+    const std::string decoder = std::string(name) == "x.webm" ? "-c:v libvpx-vp9 " : "";
+    ASSERT_EQ(std::system(("ffmpeg -hide_banner -loglevel error " + decoder + "-i " +
+                           folder.path(name) + " -f rawvideo -pix_fmt rgba " + raw)
+                              .c_str()),
+              0);
+    const std::string pixels = folder.read(std::string(name) + ".raw");
+    ASSERT_EQ(pixels.size(), 3u * 64 * 48 * 4) << name;
+    for (const uint32_t x : {8u, 56u}) {
+      const auto* pixel = reinterpret_cast<const uint8_t*>(&pixels[4 * (24 * 64 + x)]);
+      EXPECT_NEAR(pixel[3], x < 32 ? 255 : 0, 3) << name << " " << x;
+      if (x < 32) {
+        EXPECT_NEAR(pixel[0], 220, 8) << name;
+      }
+    }
+  }
+}
+
 TEST(VideoWriter, Y4mColoursAreWhatFfmpegSees) {
   if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg on this machine";
   const Folder folder;

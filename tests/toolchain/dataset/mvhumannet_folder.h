@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "gtest/gtest.h"
+#include "ports/media/jpeg.h"
 #include "ports/media/png.h"
-#include "toolchain/dataset/jpeg.h"
 #include "toolchain/error.h"
 #include "toolchain/temporary_folder.h"
 
@@ -79,7 +79,7 @@ inline void write_folder(const TemporaryFolder& folder, const FolderSettings& se
       std::snprintf(number, sizeof number, "%04u", frame);
       write_bytes(folder / ("images_lr/" + camera_name(camera) + "/" + number + "_img.jpg"), [&] {
         std::filesystem::create_directories(folder / ("images_lr/" + camera_name(camera)));
-        return encode_jpeg(plain_image(static_cast<uint8_t>(100 + frame)), 95);
+        return ports::encode_jpeg(plain_image(static_cast<uint8_t>(100 + frame)), 95).value();
       }());
       write_bytes(folder / ("fmask_lr/" + camera_name(camera) + "/" + number + "_img_fmask.png"),
                   ports::encode_png(left_half_mask()).value());

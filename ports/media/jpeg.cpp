@@ -1,4 +1,4 @@
-#include "toolchain/dataset/jpeg.h"
+#include "ports/media/jpeg.h"
 
 #include <csetjmp>
 #include <cstdio>
@@ -8,11 +8,10 @@
 // jpeglib.h needs stdio.h before it.
 #include <jpeglib.h>
 
-#include "figurine/check.h"
-#include "toolchain/error.h"
-
-namespace figurine::dataset {
+namespace figurine::ports {
 namespace {
+
+constexpr uint32_t kMaxSide = 16384;
 
 // libjpeg reports errors by a callback that must not return; longjmp is its documented way out. No
 // C++ object may live across the jump, so the functions that call setjmp touch plain data alone.
@@ -37,8 +36,8 @@ void keep_warning(j_common_ptr info, int level) {
 
 // Reads the header, then calls prepare(header) for a buffer of width * height * 3 bytes; a null
 // buffer stops there.
-bool run_decoder(std::span<const std::byte> bytes, ImageSize* header,
-                 uint8_t* (*prepare)(void*, const ImageSize&), void* context, JpegError* error) {
+bool run_decoder(std::span<const std::byte> bytes, JpegSize* header,
+                 uint8_t* (*prepare)(void*, const JpegSize&), void* context, JpegError* error) {
   jpeg_decompress_struct info;
   std::memset(&info, 0, sizeof info);
   info.err = jpeg_std_error(&error->manager);
@@ -71,55 +70,49 @@ bool run_decoder(std::span<const std::byte> bytes, ImageSize* header,
   return sound;
 }
 
-ports::ImageU8 decode(std::span<const std::byte> bytes, bool header_only, const std::string& name) {
-  if (bytes.empty()) throw InputError(name + ": empty file, not a JPEG");
+Result<ImageU8> decode(std::span<const std::byte> bytes, bool header_only,
+                       const std::string& name) {
+  if (bytes.empty()) return Status(StatusCode::kCorrupt, name + ": empty file, not a JPEG");
   struct Target {
-    ports::ImageU8 image;
+    ImageU8 image;
     bool header_only;
     bool too_large = false;
   } target{{}, header_only};
   target.image.channels = 3;
-  ImageSize header;
+  JpegSize header;
   JpegError error;
-  const auto prepare = [](void* context, const ImageSize& h) -> uint8_t* {
+  const auto prepare = [](void* context, const JpegSize& h) -> uint8_t* {
     auto* t = static_cast<Target*>(context);
     t->image.width_px = h.width_px;
     t->image.height_px = h.height_px;
-    t->too_large = h.width_px > kMaxImageSide || h.height_px > kMaxImageSide;
+    t->too_large = h.width_px > kMaxSide || h.height_px > kMaxSide;
     if (t->header_only || t->too_large) return nullptr;
     t->image.pixels.resize(size_t{h.width_px} * h.height_px * 3);
     return t->image.pixels.data();
   };
-  const bool sound = run_decoder(bytes, &header, prepare, &target, &error);
-  if (!sound) throw InputError(name + ": damaged JPEG: " + error.message);
-  if (target.too_large)
-    throw InputError(name + ": image larger than " + std::to_string(kMaxImageSide) +
-                     " pixels a side");
+  if (!run_decoder(bytes, &header, prepare, &target, &error))
+    return Status(StatusCode::kCorrupt, name + ": damaged JPEG: " + error.message);
+  if (target.too_large) {
+    return Status(StatusCode::kLimitExceeded,
+                  name + ": image larger than " + std::to_string(kMaxSide) + " pixels a side");
+  }
   return std::move(target.image);
 }
 
-}  // namespace
-
-ports::ImageU8 decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
-  return decode(bytes, false, name);
-}
-
-ImageSize decode_jpeg_size(std::span<const std::byte> bytes, const std::string& name) {
-  const ports::ImageU8 header = decode(bytes, true, name);
-  return {header.width_px, header.height_px};
-}
-
-std::vector<std::byte> encode_jpeg(const ports::ImageU8& image, int quality) {
-  FIG_CHECK(image.sound() && image.channels == 3, "a JPEG is written from RGB");
+// The bytes in *buffer, from malloc.
+bool run_encoder(const ImageU8& image, int quality, unsigned char** buffer, unsigned long* size,
+                 JpegError* error) {
   jpeg_compress_struct info;
   std::memset(&info, 0, sizeof info);
-  jpeg_error_mgr error;
-  info.err = jpeg_std_error(
-      &error);  // an error here is out of memory: the default handler ends the program
+  info.err = jpeg_std_error(&error->manager);
+  error->manager.error_exit = leave_on_error;
+  error->message[0] = '\0';
+  if (setjmp(error->jump) != 0) {
+    jpeg_destroy_compress(&info);
+    return false;
+  }
   jpeg_create_compress(&info);
-  unsigned char* buffer = nullptr;
-  unsigned long size = 0;
-  jpeg_mem_dest(&info, &buffer, &size);
+  jpeg_mem_dest(&info, buffer, size);
   info.image_width = image.width_px;
   info.image_height = image.height_px;
   info.input_components = 3;
@@ -137,10 +130,37 @@ std::vector<std::byte> encode_jpeg(const ports::ImageU8& image, int quality) {
   }
   jpeg_finish_compress(&info);
   jpeg_destroy_compress(&info);
+  return true;
+}
+
+}  // namespace
+
+Result<ImageU8> decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
+  return decode(bytes, false, name);
+}
+
+Result<JpegSize> decode_jpeg_size(std::span<const std::byte> bytes, const std::string& name) {
+  const Result<ImageU8> header = decode(bytes, true, name);
+  if (!header.ok()) return header.status();
+  return JpegSize{header->width_px, header->height_px};
+}
+
+Result<std::vector<std::byte>> encode_jpeg(const ImageU8& image, int quality) {
+  if (!image.sound() || image.channels != 3 || quality < 1 || quality > 100) {
+    return Status(StatusCode::kInvalidArgument,
+                  "jpeg: written from sound RGB images at qualities 1 to 100");
+  }
+  unsigned char* buffer = nullptr;
+  unsigned long size = 0;
+  JpegError error;
+  if (!run_encoder(image, quality, &buffer, &size, &error)) {
+    std::free(buffer);
+    return Status(StatusCode::kOutOfMemory, std::string("jpeg: ") + error.message);
+  }
   const auto* begin = reinterpret_cast<const std::byte*>(buffer);
   std::vector<std::byte> bytes(begin, begin + size);
   std::free(buffer);
   return bytes;
 }
 
-}  // namespace figurine::dataset
+}  // namespace figurine::ports
