@@ -3,11 +3,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "ports/gaussians/ply.h"
 #include "ports/host/files.h"
 #include "samples/common/device_options.h"
 #include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
-#include "samples/gaussians/ply.h"
 
 namespace figurine::samples {
 
@@ -45,7 +45,7 @@ Status run_export(const ExportOptions& options) {
   const bool antialiased = scene->avatar(0).avatar.antialiased;
   std::vector<std::string> comments;
   if (antialiased) comments.push_back(kAntialiasedComment);
-  const std::vector<std::byte> bytes = write_gaussian_ply(*gaussians, comments);
+  const std::vector<std::byte> bytes = ports::write_gaussian_ply(*gaussians, comments);
   FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.output, bytes));
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("export");

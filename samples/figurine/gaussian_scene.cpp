@@ -27,7 +27,7 @@ glm::mat3 upright(const std::string& up) {
 Result<GaussianCloud> read_scene(const std::string& path) {
   const Result<ports::MappedFile> file = ports::MappedFile::open(path);
   if (!file.ok()) return file.status();
-  Result<GaussianCloud> cloud = read_gaussian_ply(file->bytes(), path);
+  Result<GaussianCloud> cloud = ports::read_gaussian_ply(file->bytes(), path);
   if (cloud.ok() && cloud->count() == 0)
     return Status(StatusCode::kInvalidArgument,
                   path + ": ply: holds no Gaussian that can be drawn");

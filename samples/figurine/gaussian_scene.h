@@ -8,10 +8,12 @@
 
 #include "figurine/camera.h"
 #include "figurine/status.h"
+#include "ports/gaussians/ply.h"
 #include "samples/common/parse.h"
-#include "samples/gaussians/ply.h"
 
 namespace figurine::samples {
+
+using ports::GaussianCloud;
 
 inline constexpr ImageSize kSceneSize{1024, 768};
 

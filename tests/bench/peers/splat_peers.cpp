@@ -17,7 +17,7 @@
 #include "bench/peers/peer.h"
 #include "figurine/renderer.h"
 #include "ports/host/files.h"
-#include "samples/gaussians/ply.h"
+#include "ports/gaussians/ply.h"
 
 namespace figurine::peers {
 namespace {
@@ -25,12 +25,12 @@ namespace {
 constexpr uint32_t kSide = 1024;
 
 struct Subject {
-  samples::GaussianCloud cloud;
+  ports::GaussianCloud cloud;
   Camera camera;
   std::vector<float> truth;  // [side,side,3] premultiplied
 };
 
-Camera look_at(const samples::GaussianCloud& cloud) {
+Camera look_at(const ports::GaussianCloud& cloud) {
   float low = 1e30f, high = -1e30f, x = 0, z = 0;
   for (size_t i = 0; i < cloud.count(); ++i) {
     low = std::min(low, cloud.position_m[3 * i + 1]);
@@ -136,7 +136,7 @@ int run(int argc, char** argv) {
     std::fprintf(stderr, "splat_peers: %s\n", file.status().message().c_str());
     return 1;
   }
-  auto cloud = samples::read_gaussian_ply(file->bytes(), argv[1]);
+  auto cloud = ports::read_gaussian_ply(file->bytes(), argv[1]);
   if (!cloud.ok() || cloud->count() == 0 || cloud->sh_degree != 0) {
     std::fprintf(
         stderr, "splat_peers: %s\n",

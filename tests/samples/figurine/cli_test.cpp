@@ -10,7 +10,7 @@
 #include "runtime/test_packages.h"
 #include "samples/common/camera_spec.h"
 #include "samples/figurine/image_error.h"
-#include "samples/ply_text.h"
+#include "ports/gaussians/ply_text.h"
 #include "samples/program.h"
 
 namespace figurine::tests::cli_test {

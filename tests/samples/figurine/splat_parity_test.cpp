@@ -10,8 +10,8 @@
 #include "oracle/splat_oracle.h"
 #include "ports/media/pfm.h"
 #include "runtime/test_packages.h"
-#include "samples/gaussians/ply.h"
-#include "samples/ply_text.h"
+#include "ports/gaussians/ply.h"
+#include "ports/gaussians/ply_text.h"
 #include "samples/program.h"
 
 namespace figurine::tests::splat_parity_test {
@@ -50,8 +50,8 @@ double compare_through_files(bool antialiased) {
   FIG_CHECK(picture.ok() && picture->channels == 4, "a picture with alpha");
 
   // The oracle sees what the file says and the camera that the program says it used.
-  const Result<samples::GaussianCloud> cloud =
-      samples::read_gaussian_ply(std::as_bytes(std::span(ply)), "scene.ply");
+  const Result<ports::GaussianCloud> cloud =
+      ports::read_gaussian_ply(std::as_bytes(std::span(ply)), "scene.ply");
   FIG_CHECK(cloud.ok() && cloud->count() == 20000, "the scene as it was written");
   const nlohmann::json said = nlohmann::json::parse(run.out), json = said["camera"];
   EXPECT_EQ(said["antialiased"], antialiased);

@@ -1,6 +1,6 @@
 // Scales and rotation from a covariance factor: closed form first, then random factors over all
 // shapes.
-#include "samples/gaussians/decompose.h"
+#include "ports/gaussians/decompose.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "largest_error.h"
 
-namespace figurine::samples::decompose_test {
+namespace figurine::ports::decompose_test {
 namespace {
 
 using Matrix = std::array<double, 9>;
@@ -99,4 +99,4 @@ TEST(Decompose, FlatAndPointlikeGaussians) {
 }
 
 }  // namespace
-}  // namespace figurine::samples::decompose_test
+}  // namespace figurine::ports::decompose_test

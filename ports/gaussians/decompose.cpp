@@ -5,7 +5,7 @@
 //
 // Based on: Hestenes, Inversion of Matrices by Biorthogonalization and Related Results, 1958;
 // Demmel and Veselic, Jacobi's Method is More Accurate than QR, 1992.
-#include "samples/gaussians/decompose.h"
+#include "ports/gaussians/decompose.h"
 
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -13,7 +13,7 @@
 #include <glm/mat3x3.hpp>
 #include <utility>
 
-namespace figurine::samples {
+namespace figurine::ports {
 
 namespace {
 
@@ -83,4 +83,4 @@ ScaleRotation decompose(const float* factor) {
           quaternion_of(x, y, glm::cross(x, y))};
 }
 
-}  // namespace figurine::samples
+}  // namespace figurine::ports

@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace figurine::samples {
+namespace figurine::ports {
 
 struct ScaleRotation {
   std::array<double, 3> scale;       // singular values of F, descending, >= 0
@@ -15,4 +15,4 @@ struct ScaleRotation {
 // keep their relative accuracy.
 ScaleRotation decompose(const float* factor);  // [9] row-major
 
-}  // namespace figurine::samples
+}  // namespace figurine::ports

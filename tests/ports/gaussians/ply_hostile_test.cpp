@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <random>
 
-#include "samples/gaussians/ply.h"
-#include "samples/ply_text.h"
+#include "ports/gaussians/ply.h"
+#include "ports/gaussians/ply_text.h"
 
-namespace figurine::samples::ply_hostile_test {
+namespace figurine::ports::ply_hostile_test {
 namespace {
 
 using tests::PlyColumn;
@@ -160,4 +160,4 @@ TEST(HostilePly, FlippedBytesStaySound) {
 }
 
 }  // namespace
-}  // namespace figurine::samples::ply_hostile_test
+}  // namespace figurine::ports::ply_hostile_test

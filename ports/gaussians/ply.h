@@ -17,7 +17,7 @@
 #include "figurine/gaussian.h"
 #include "figurine/status.h"
 
-namespace figurine::samples {
+namespace figurine::ports {
 
 // Gaussians that own their arrays, laid out as GaussianView wants them.
 struct GaussianCloud {
@@ -48,4 +48,4 @@ Result<GaussianCloud> read_gaussian_ply(std::span<const std::byte> bytes, const 
 std::vector<std::byte> write_gaussian_ply(const GaussianView& gaussians,
                                           const std::vector<std::string>& comments = {});
 
-}  // namespace figurine::samples
+}  // namespace figurine::ports

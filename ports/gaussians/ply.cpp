@@ -1,4 +1,4 @@
-#include "samples/gaussians/ply.h"
+#include "ports/gaussians/ply.h"
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,9 @@
 #include <optional>
 #include <string_view>
 
-#include "samples/gaussians/decompose.h"
+#include "ports/gaussians/decompose.h"
 
-namespace figurine::samples {
+namespace figurine::ports {
 
 namespace {
 
@@ -450,4 +450,4 @@ std::vector<std::byte> write_gaussian_ply(const GaussianView& gaussians,
   return bytes;
 }
 
-}  // namespace figurine::samples
+}  // namespace figurine::ports

@@ -1,6 +1,6 @@
 // The .ply reader on every variety that is found in the wild, against values worked out here; the
 // writer by reading back.
-#include "samples/gaussians/ply.h"
+#include "ports/gaussians/ply.h"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 
 #include "figurine/pose.h"
 #include "largest_error.h"
-#include "samples/ply_text.h"
+#include "ports/gaussians/ply_text.h"
 
-namespace figurine::samples::ply_test {
+namespace figurine::ports::ply_test {
 namespace {
 
 using tests::make_ply;
@@ -257,4 +257,4 @@ TEST(GaussianPly, WritesCommentsThatReadersSkip) {
 }
 
 }  // namespace
-}  // namespace figurine::samples::ply_test
+}  // namespace figurine::ports::ply_test
