@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/src/base/float_mode.h"
 #include "runtime/src/base/stage_clock.h"
 #include "runtime/src/kernels/table.h"
 #include "runtime/src/pose/avatar_identity.h"
@@ -249,6 +250,7 @@ Result<AvatarId> Renderer::add_avatar(const Package& avatar, const Package& body
 
 Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
                                       std::optional<Precision> precision) {
+  const FloatModeScope mode(FloatMode::frame());
   if (body.kind() != PackageKind::kBody)
     return Status(StatusCode::kMismatch,
                   std::string("a body is wanted, not a ") + to_string(body.kind()));
@@ -295,6 +297,7 @@ Precision Renderer::precision(AvatarId avatar) const {
 }
 
 Status Renderer::render(const Frame& frame, const ImageTarget& target) {
+  const FloatModeScope mode(FloatMode::frame());
   Impl& impl = *impl_;
   uint32_t blocks = 0;
   FIG_RETURN_IF_ERROR(impl.validate(frame, target, blocks));
@@ -318,6 +321,7 @@ Status Renderer::render(const Frame& frame, const ImageTarget& target) {
 }
 
 Result<GaussianView> Renderer::pose_avatar(AvatarId id, const PoseView& pose) {
+  const FloatModeScope mode(FloatMode::frame());
   FIG_RETURN_IF_ERROR(impl_->validate_avatar(id, pose));
   PosedAvatar& posed = impl_->avatar(id);
   const uint32_t count = posed.body().texel_count();

@@ -53,6 +53,7 @@ class AvatarSampler {
    public:
     virtual ~Trace() = default;
     // step: from 1. lambda: what has been arrived at. An error ends the sampling and is returned.
+    // Called in IEEE 754's default mode of floats, whatever the sampler's caller has.
     virtual Status after_step(uint32_t step, double lambda, const SampledAvatar& avatar) = 0;
   };
 

@@ -9,7 +9,9 @@
 //
 // A frame takes any number of avatars and static Gaussians, sorted together by view depth. Packages
 // are borrowed: their bytes must outlive their avatars here (remove_avatar). A Renderer is used by
-// one thread at a time; it spreads its own work over its pool.
+// one thread at a time; it spreads its own work over its pool. Its caller's way with floats
+// (rounding, traps, denormals) changes nothing in it and is as before after every call; inside one,
+// denormals are zero (docs/numerics.md, "Same pixels").
 #pragma once
 
 #include <cstdint>

@@ -19,11 +19,8 @@
 #include <utility>
 
 #include "runtime/src/base/drop_in_pthreadpool.h"
+#include "runtime/src/base/float_mode.h"
 #include "runtime/src/base/worker_pool.h"
-
-#if defined(__x86_64__)
-#include <xmmintrin.h>
-#endif
 
 struct pthreadpool {
   std::unique_ptr<figurine::WorkerPool> workers;
@@ -31,47 +28,9 @@ struct pthreadpool {
 
 namespace {
 
+using figurine::FloatMode;
+using figurine::FloatModeScope;
 using figurine::WorkerPool;
-
-// Tiny results become zero, on this thread, while it lives.
-class DenormalsOff {
- public:
-  explicit DenormalsOff(bool wanted) : wanted_(wanted) {
-    if (!wanted_) return;
-    before_ = get();
-    set(before_ | kFlushToZero);
-  }
-  ~DenormalsOff() {
-    if (wanted_) set(before_);
-  }
-  DenormalsOff(const DenormalsOff&) = delete;
-  DenormalsOff& operator=(const DenormalsOff&) = delete;
-
- private:
-#if defined(__x86_64__)
-  using Register = unsigned int;
-  static constexpr Register kFlushToZero = 0x8040;  // results, and inputs as well
-  static Register get() { return _mm_getcsr(); }
-  static void set(Register value) { _mm_setcsr(value); }
-#elif defined(__aarch64__)
-  using Register = unsigned long;
-  static constexpr Register kFlushToZero = 0x1080000;  // of all widths
-  static Register get() {
-    Register value;
-    asm volatile("mrs %0, fpcr" : "=r"(value));
-    return value;
-  }
-  static void set(Register value) { asm volatile("msr fpcr, %0" : : "r"(value)); }
-#else
-  using Register = unsigned int;
-  static constexpr Register kFlushToZero = 0;
-  static Register get() { return 0; }
-  static void set(Register) {}
-#endif
-
-  const bool wanted_;
-  Register before_ = 0;
-};
 
 // More batches than threads, so that a thread that comes late or is taken away leaves little
 // undone.
@@ -124,7 +83,9 @@ struct Grid {
   }
   static void share(void* context, WorkerPool::Loop& loop, uint32_t thread) {
     const Grid& grid = *static_cast<const Grid*>(context);
-    const DenormalsOff denormals_off(grid.denormals_off);
+    // Workers have their caller's mode already.
+    const FloatMode mode = FloatMode::of_this_thread();
+    const FloatModeScope in_mode(grid.denormals_off ? mode.without_denormals() : mode);
     for (size_t begin, end; loop.next(grid.batch, begin, end);) grid.visit(begin, end, thread);
   }
 };

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/src/base/float_mode.h"
+
 namespace figurine {
 namespace {
 
@@ -88,6 +90,7 @@ struct WorkerPool::Impl {
       seen = wait_while(loops, seen);
       if (ended.load()) return;
       if (!enter()) continue;
+      mode.set();
       share(context, loop, thread);
       // The last one out of a closed loop: its caller may sleep.
       if (inside.fetch_sub(1, std::memory_order_release) == 1) inside.notify_one();
@@ -109,6 +112,7 @@ struct WorkerPool::Impl {
   // The loop, written by its caller while it is closed and nobody is inside.
   Share share = nullptr;
   void* context = nullptr;
+  FloatMode mode = FloatMode::exact();  // of the caller
   Loop loop;
   alignas(64) std::atomic<uint32_t> inside{
       0};                                      // workers in the loop, and kOpen while more may come
@@ -135,7 +139,7 @@ void WorkerPool::run(size_t count, Share share, void* context) {
     run_alone(count, share, context);
     return;
   }
-  impl.share = share, impl.context = context;
+  impl.share = share, impl.context = context, impl.mode = FloatMode::of_this_thread();
   impl.loop.count_ = count;
   impl.loop.next_.store(0, std::memory_order_relaxed);
   impl.inside.store(Impl::kOpen, std::memory_order_release);

@@ -30,8 +30,9 @@ class WorkerPool {
   using Share = void (*)(void* context, Loop& loop, uint32_t thread);
 
   // share(context, loop, thread) on the caller's thread, 0, and on workers, 1 and up, that come in
-  // time; returns when all indices of [0, count) are done. A loop begun while another runs, within
-  // it or by another thread, runs on its caller's thread alone.
+  // time; returns when all indices of [0, count) are done. Workers compute in their caller's
+  // FloatMode. A loop begun while another runs, within it or by another thread, runs on its
+  // caller's thread alone.
   void run(size_t count, Share share, void* context);
   static void run_alone(size_t count, Share share, void* context);
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "figurine/detail/double_math.h"
+#include "runtime/src/base/float_mode.h"
 #include "runtime/src/base/memory.h"
 #include "runtime/src/kernels/table.h"
 #include "runtime/src/sample/device_transformer.h"
@@ -136,6 +137,7 @@ AvatarSampler::~AvatarSampler() = default;
 
 Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& sampler,
                                                              std::optional<Isa> isa) {
+  const FloatModeScope mode(FloatMode::exact());
   const Result<const KernelTable*> kernels = kernels_for(isa.value_or(supported_isas().back()));
   if (!kernels.ok()) return kernels.status();
   std::unique_ptr<Impl> impl(new (std::nothrow) Impl(sampler));
@@ -152,6 +154,8 @@ Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& samp
 }
 
 Status AvatarSampler::sample(const SampleRequest& request, SampledAvatar& out, Trace* trace) {
+  // Weights are data, of which denormals are a part; they were trained and hashed with them.
+  const FloatModeScope mode(FloatMode::exact());
   Impl& impl = *impl_;
   const uint32_t steps = request.steps == 0 ? impl.sampler.steps : request.steps;
   if (steps > kMaxSolverSteps)
