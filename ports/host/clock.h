@@ -1,4 +1,4 @@
-// Time, from the system.
+// Time, from the system: what it is, and waiting for it.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,10 @@
 
 namespace figurine::ports {
 
-uint64_t now_ns();       // monotonic, from an unnamed start
+uint64_t now_ns();  // monotonic, from an unnamed start
+// Returns at that time of now_ns() or a little later, at once if it is past. A signal whose handler
+// returns does not end it.
+void sleep_until(uint64_t time_ns);
 std::string date_utc();  // "2026-01-31T12:00:00Z"
 
 }  // namespace figurine::ports
