@@ -59,6 +59,9 @@ Status check_counts(const SceneOptions& options) {
                       "for each of the " + std::to_string(count) + " avatars");
   };
   FIG_RETURN_IF_ERROR(check("motion", options.motions.size(), true));
+  FIG_RETURN_IF_ERROR(check("pose", options.poses.size(), true));
+  if (!options.poses.empty() && !options.motions.empty())
+    return Status(StatusCode::kInvalidArgument, "pose: give a pose or a motion, not both");
   FIG_RETURN_IF_ERROR(check("coarse", options.coarse.size(), true));
   if (options.crowd > 1 && !options.places.empty())
     return Status(StatusCode::kInvalidArgument, "place: a crowd finds its own");
@@ -87,6 +90,7 @@ PoseView Scene::Figure::recorded_pose(uint32_t frame) const {
     const Motion& clip = motion->package.motion();
     return clip.pose((frame + ahead_frames) % clip.frame_count);
   }
+  if (pose) return pose->view();
   const GoldenFrame& golden = avatar->avatar.golden;
   return {golden.root_translation_m, golden.rotations};
 }
@@ -102,6 +106,12 @@ Status Scene::load_packages(const SceneOptions& options, size_t index,
   Result<std::unique_ptr<LoadedPackage>> motion = load_motion(options.motions, index, *figure.body);
   if (!motion.ok()) return motion.status();
   figure.motion = std::move(*motion);
+  if (!options.poses.empty()) {
+    Result<StoredPose> pose = load_pose_json(options.poses[options.poses.size() == 1 ? 0 : index],
+                                             figure.body->package.body().joint_names);
+    if (!pose.ok()) return pose.status();
+    figure.pose = std::move(*pose);
+  }
   return load_coarse(options, index, others, figure);
 }
 
@@ -134,7 +144,7 @@ Result<Scene::Figure> Scene::load_figure(const SceneOptions& options, size_t ind
     const Figure& first = others[index % options.avatars.size()];
     figure.avatar = first.avatar, figure.coarse = first.coarse;
     figure.body = first.body, figure.coarse_body = first.coarse_body;
-    figure.motion = first.motion;
+    figure.motion = first.motion, figure.pose = first.pose;
   }
   constexpr uint32_t kAhead_frames = 29;  // about a second, and no part of a usual loop's length
   figure.ahead_frames = options.crowd > 1 ? kAhead_frames * static_cast<uint32_t>(index) : 0;

@@ -12,6 +12,7 @@
 #include "figurine/renderer.h"
 #include "samples/common/loading.h"
 #include "samples/common/parse.h"
+#include "samples/common/pose_json.h"
 #include "samples/common/pose_source.h"
 
 namespace figurine::samples {
@@ -21,6 +22,7 @@ struct SceneOptions {
   std::vector<std::string> coarse;   // FrameAvatar::coarse: none, one for all, or one for each
   std::string body;                  // empty: found by content hash
   std::vector<std::string> motions;  // none: the golden pose; one for all, or one for each avatar
+  std::vector<std::string> poses;    // in their place, of pose files (pose_json.h)
   float spacing_m = 0.9f;            // between neighbours side by side, where no places are given
   std::vector<std::string> places;   // "X,Z[,HEADING]" for each avatar, or none
   // Above 1: so many of every avatar in rows and columns, looking everywhere, each at a moment of
@@ -72,6 +74,7 @@ class Scene {
   struct Figure {
     std::shared_ptr<LoadedAvatar> avatar, coarse;
     std::shared_ptr<LoadedPackage> body, coarse_body, motion;
+    std::optional<StoredPose> pose;  // in place of a motion and of the golden pose
     Placement place;
     uint32_t ahead_frames = 0;         // of the scene
     std::vector<float> rest_joints_m;  // [J,3] of the template that the Gaussians sit on
@@ -79,7 +82,7 @@ class Scene {
     std::vector<float> rotations;  // [J,4] of the last pose
     std::array<float, 3> root_translation_m{0, 0, 0};
 
-    // Without motion the golden pose, whatever the frame.
+    // Without motion the pose of a file or the golden one, whatever the frame.
     PoseView recorded_pose(uint32_t frame) const;
   };
   static Result<Figure> load_figure(const SceneOptions& options, size_t index,

@@ -21,6 +21,7 @@ Command add_sample_command(CLI::App& app);
 Command add_render_command(CLI::App& app);
 Command add_splat_command(CLI::App& app);
 Command add_export_command(CLI::App& app);
+Command add_pose_command(CLI::App& app);
 Command add_bench_command(CLI::App& app);
 Command add_report_command(CLI::App& app);
 Command add_selftest_command(CLI::App& app);

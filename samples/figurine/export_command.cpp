@@ -80,6 +80,10 @@ Command add_export_command(CLI::App& app) {
   command
       ->add_option("--motion", options->scene.motions, "motion package; default: the golden pose")
       ->expected(1);
+  command
+      ->add_option("--pose", options->scene.poses,
+                   "pose file (.json, docs/poses.md) in place of a motion")
+      ->expected(1);
   command->add_option("--frame", options->frame, "of the motion")
       ->check(CLI::Range(0u, UINT32_MAX - 1))
       ->capture_default_str();

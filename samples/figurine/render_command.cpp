@@ -250,6 +250,13 @@ Command add_render_command(CLI::App& app) {
                    "motion packages: one for all avatars, or one for each")
       ->expected(1)
       ->take_all();
+  command
+      ->add_option(
+          "--pose", options->scene.poses,
+          "pose files (.json, docs/poses.md) in place of a motion: one for all avatars, or "
+          "one for each")
+      ->expected(1)
+      ->take_all();
   command->add_option("--frames", options->frames,
                       "N, A:B or A:B:STEP (B excluded); default: all, or frame 0 for one image");
   command
