@@ -18,8 +18,8 @@
 
 #include "figurine/avatar_sampler.h"
 #include "runtime/sample/random_sampler.h"
-#include "runtime/src/base/thread_pool.h"
 #include "runtime/splat_scene.h"
+#include "runtime/src/base/thread_pool.h"
 #include "runtime/test_packages.h"
 
 namespace figurine::float_mode_test {
@@ -70,13 +70,12 @@ struct Caller {
   const char* name;
   std::function<void()> prepare;
 };
-const Caller kCallers[] = {
-    {"the default", [] { FloatMode::exact().set(); }},
-    {"denormals off", [] { FloatMode::frame().set(); }},
-    {"rounding up", [] {
-       FloatMode::exact().set();
-       ::fesetround(FE_UPWARD);
-     }}};
+const Caller kCallers[] = {{"the default", [] { FloatMode::exact().set(); }},
+                           {"denormals off", [] { FloatMode::frame().set(); }},
+                           {"rounding up", [] {
+                              FloatMode::exact().set();
+                              ::fesetround(FE_UPWARD);
+                            }}};
 
 TEST_F(FloatModes, AScopeFlushesAndGivesBack) {
   EXPECT_FALSE(flushes());
@@ -203,8 +202,7 @@ TEST_F(FloatModes, CallersGetTheirOwnBackWhateverHappens) {
 tests::Scene make_denormal_scene(bool zero) {
   tests::Scene scene = tests::make_random_scene(1500, 1, 11);
   tests::Random random(12);
-  for (std::vector<float>* values :
-       {&scene.position, &scene.factor, &scene.opacity, &scene.sh}) {
+  for (std::vector<float>* values : {&scene.position, &scene.factor, &scene.opacity, &scene.sh}) {
     for (float& value : *values) {
       if (random.uniform(0, 1) > 0.25f) continue;
       const float size = random.uniform(1e-4f, 10), tiny = zero ? 0.0f : kDenormal * size;
@@ -225,15 +223,14 @@ TEST_F(FloatModes, ASceneOfDenormalsIsOneOfZerosOnAllThreadsAndInstructionSets) 
       for (const uint32_t threads : {1u, 2u}) {
         for (const Caller& caller : kCallers) {
           caller.prepare();
-          Result<std::unique_ptr<Renderer>> renderer = Renderer::create(
-              {.threads = threads, .allow_oversubscription = true, .isa = isa});
+          Result<std::unique_ptr<Renderer>> renderer =
+              Renderer::create({.threads = threads, .allow_oversubscription = true, .isa = isa});
           ASSERT_TRUE(renderer.ok());
           for (const bool fast : {false, true}) {
             // The fast tier has other last bits; it must cope, no more.
-            const tests::FloatImage image =
-                tests::render(**renderer, {.camera = camera,
-                                           .gaussians = {&view, 1},
-                                           .approximation = {.fast_blend = fast}});
+            const tests::FloatImage image = tests::render(
+                **renderer,
+                {.camera = camera, .gaussians = {&view, 1}, .approximation = {.fast_blend = fast}});
             if (!first) first = image.rgba;
             EXPECT_TRUE(fast || image.rgba == *first)
                 << to_string(isa) << ", " << threads << " threads, " << caller.name

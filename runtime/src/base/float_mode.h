@@ -1,6 +1,7 @@
 // How a thread's floats round, trap and treat denormals: what a frame and a sampler run in,
 // whatever their caller has, and what he gets back. Denormals cost some CPUs a hundred cycles an
-// operation; a frame takes them for zero, as inputs and as results (docs/numerics.md, "Same pixels").
+// operation; a frame takes them for zero, as inputs and as results (docs/numerics.md, "Same
+// pixels").
 //
 // On other architectures nothing is set.
 #pragma once
@@ -41,7 +42,7 @@ class FloatMode {
   static void set(Register value) { _mm_setcsr(value); }
 #elif defined(__aarch64__)
   using Register = uint64_t;
-  static constexpr Register kDefault = 0;             // FPCR
+  static constexpr Register kDefault = 0;              // FPCR
   static constexpr Register kFlushToZero = 0x1080000;  // FZ and FZ16: inputs and results
   static Register get() {
     Register value;

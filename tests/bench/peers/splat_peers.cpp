@@ -16,8 +16,8 @@
 
 #include "bench/peers/peer.h"
 #include "figurine/renderer.h"
-#include "ports/host/files.h"
 #include "ports/gaussians/ply.h"
+#include "ports/host/files.h"
 
 namespace figurine::peers {
 namespace {

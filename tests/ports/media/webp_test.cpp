@@ -16,7 +16,8 @@ namespace {
 class Folder {
  public:
   Folder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "figurine-webp-XXXXXX").string();
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "figurine-webp-XXXXXX").string();
     FIG_CHECK(::mkdtemp(pattern.data()) != nullptr, "no temporary folder");
     path_ = pattern;
   }
@@ -88,8 +89,7 @@ TEST(Webp, KeepsPicturesAlphaAndTimes) {
         folder.path("x.WebP"),
         {.width_px = 61, .height_px = 47, .rate = {30000, 1001}, .alpha = channels == 4});
     ASSERT_TRUE(writer.ok()) << writer.status().message();
-    for (int i = 0; i < kFrames; ++i)
-      ASSERT_TRUE((*writer)->add(disc(61, 47, i, channels)).ok());
+    for (int i = 0; i < kFrames; ++i) ASSERT_TRUE((*writer)->add(disc(61, 47, i, channels)).ok());
     ASSERT_TRUE((*writer)->finish().ok());
     EXPECT_EQ(folder.files(), 1u);
     const Decoded decoded = decode(folder.path("x.WebP"));
@@ -131,10 +131,11 @@ TEST(Webp, WhatCannotBeIsRefusedAndLeavesNothing) {
                 .status()
                 .code(),
             StatusCode::kLimitExceeded);
-  EXPECT_EQ(VideoWriter::create(folder.path("x.mp4"), {.width_px = 4, .height_px = 4, .alpha = true})
-                .status()
-                .code(),
-            StatusCode::kInvalidArgument);
+  EXPECT_EQ(
+      VideoWriter::create(folder.path("x.mp4"), {.width_px = 4, .height_px = 4, .alpha = true})
+          .status()
+          .code(),
+      StatusCode::kInvalidArgument);
   auto writer = VideoWriter::create(folder.path("x.webp"), {.width_px = 4, .height_px = 4});
   EXPECT_EQ((*writer)->add(ImageU8(4, 5, 3)).code(), StatusCode::kInvalidArgument);
   EXPECT_EQ((*writer)->add(ImageU8(4, 4, 4)).code(), StatusCode::kInvalidArgument);

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "ports/gaussians/ply_text.h"
 #include "ports/media/pfm.h"
 #include "ports/media/png.h"
 #include "runtime/test_packages.h"
 #include "samples/common/camera_spec.h"
 #include "samples/figurine/image_error.h"
-#include "ports/gaussians/ply_text.h"
 #include "samples/program.h"
 
 namespace figurine::tests::cli_test {

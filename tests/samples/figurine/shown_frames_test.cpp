@@ -36,8 +36,7 @@ TEST(ShownFrames, OfAFasterMotionFramesAreLeftOut) {
 TEST(ShownFrames, OfASlowerMotionFramesAreRepeated) {
   const ShownFrames shown = frames_in_time(first(3), 30, 60);
   EXPECT_EQ(shown.frames, (std::vector<uint32_t>{0, 0, 1, 1, 2, 2}));
-  EXPECT_EQ(shown.note,
-            "a motion of 30 frames a second, shown at 60: frames are shown 2 times");
+  EXPECT_EQ(shown.note, "a motion of 30 frames a second, shown at 60: frames are shown 2 times");
 }
 
 // Over any number of frames no moment is further than one frame of the motion from its own.
@@ -58,8 +57,7 @@ TEST(ShownFrames, OneFrameIsShownOnceAtAnyRate) {
 }
 
 TEST(ShownFrames, ATurnStartsAMotionAgainAndHoldsAFrame) {
-  EXPECT_EQ(turntable_frames({4, 5, 6}, 30, {}, 5).frames,
-            (std::vector<uint32_t>{4, 5, 6, 4, 5}));
+  EXPECT_EQ(turntable_frames({4, 5, 6}, 30, {}, 5).frames, (std::vector<uint32_t>{4, 5, 6, 4, 5}));
   EXPECT_EQ(turntable_frames({4, 5, 6}, 60, 30, 4).frames, (std::vector<uint32_t>{4, 6, 5, 4}));
   const ShownFrames held = turntable_frames({9}, 30, 12, 3);
   EXPECT_EQ(held.frames, (std::vector<uint32_t>{9, 9, 9}));

@@ -8,10 +8,10 @@
 
 #include "figurine/camera.h"
 #include "oracle/splat_oracle.h"
-#include "ports/media/pfm.h"
-#include "runtime/test_packages.h"
 #include "ports/gaussians/ply.h"
 #include "ports/gaussians/ply_text.h"
+#include "ports/media/pfm.h"
+#include "runtime/test_packages.h"
 #include "samples/program.h"
 
 namespace figurine::tests::splat_parity_test {
