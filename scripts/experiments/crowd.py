@@ -22,7 +22,7 @@ import tempfile
 import pfm
 import results
 
-ROUNDS = 3
+ROUNDS = 5
 BENCH_FRAMES = 24
 PICTURE_FRAMES = "8:12"
 FIGURINE = pathlib.Path("build/release/samples/figurine/figurine")
