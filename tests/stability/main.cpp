@@ -71,7 +71,7 @@ int run(const std::string& output) {
               {"date", date()},
               {"rows", Json::array()}};
   size_t broken = 0;
-  for (std::span<const Case> cases : {splat_cases(), pose_cases(), package_cases(),
+  for (std::span<const Case> cases : {splat_cases(), pose_cases(), live_cases(), package_cases(),
                                       fixed_point_cases(), sampling_cases(), sampler_cases()}) {
     for (const Case& one : cases) {
       for (const Row& row : one.run()) {

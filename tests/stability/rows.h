@@ -31,6 +31,7 @@ struct Case {
 
 std::span<const Case> splat_cases();
 std::span<const Case> pose_cases();
+std::span<const Case> live_cases();
 std::span<const Case> package_cases();
 std::span<const Case> fixed_point_cases();
 std::span<const Case> sampling_cases();
