@@ -64,6 +64,11 @@ Status AtomicFile::write(std::span<const std::byte> bytes) {
   return {};
 }
 
+int AtomicFile::descriptor() const {
+  FIG_CHECK(file_ != nullptr, "descriptor after finish");
+  return ::fileno(file_);
+}
+
 Status AtomicFile::finish() {
   if (file_ == nullptr) return {};
   const bool written = std::fflush(file_) == 0 && ::fsync(::fileno(file_)) == 0;

@@ -23,6 +23,8 @@ class AtomicFile {
   ~AtomicFile();
 
   Status write(std::span<const std::byte> bytes);
+  // Of the temporary, for a writer that needs one, in place of write(); this object's to close.
+  int descriptor() const;
   // Flushes, syncs and closes: after this only the name is temporary. Optional; commit() does it
   // first.
   Status finish();

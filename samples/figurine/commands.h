@@ -19,6 +19,7 @@ struct Command {
 
 Command add_sample_command(CLI::App& app);
 Command add_render_command(CLI::App& app);
+Command add_live_command(CLI::App& app);
 Command add_splat_command(CLI::App& app);
 Command add_export_command(CLI::App& app);
 Command add_pose_command(CLI::App& app);

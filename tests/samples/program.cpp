@@ -81,6 +81,8 @@ ProgramRun run_figurine(const std::string& arguments, const RunOptions& options)
   return run;
 }
 
+const char* figurine_program() { return FIGURINE_PROGRAM; }
+
 ProgramRun run_shell(const std::string& command, const TestFolder& folder) {
   const TestFolder streams;
   const int status = std::system(("cd '" + folder.path() + "' && { " + command + "; } > '" +

@@ -43,6 +43,8 @@ struct RunOptions {
 
 // "figurine ARGUMENTS", arguments as the shell reads them.
 ProgramRun run_figurine(const std::string& arguments, const RunOptions& options = {});
+// The path of figurine, for what a shell does with it: pipes, jobs.
+const char* figurine_program();
 ProgramRun run_shell(const std::string& command, const TestFolder& folder);
 
 // The avatar of write_test_packages with a golden picture in it, an 8-bit RGB PNG of its golden
