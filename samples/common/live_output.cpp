@@ -12,6 +12,7 @@
 #include "ports/host/clock.h"
 #include "samples/common/pose_feed.h"
 #include "samples/common/progress.h"
+#include "samples/common/v4l2_sink.h"
 #include "samples/common/y4m_pipe.h"
 
 namespace figurine::samples {
@@ -20,7 +21,7 @@ namespace {
 
 constexpr uint64_t kLook_ns = 20'000'000;  // how often a FIFO is asked for its reader
 
-enum class Kind { kStandardOutput, kFile, kStream };
+enum class Kind { kStandardOutput, kVideoDevice, kFile, kStream };
 
 Result<Kind> kind_of(const std::string& name) {
   const auto unsupported = [&](const std::string& why) {
@@ -28,14 +29,13 @@ Result<Kind> kind_of(const std::string& name) {
   };
   if (name == "-") return Kind::kStandardOutput;
   if (name == "window") return unsupported("there is no window in this build");
-  if (name.starts_with("/dev/video"))
-    return unsupported("video devices are unsupported in this build");
+  if (name.starts_with("/dev/video")) return Kind::kVideoDevice;
   struct stat there{};
   const bool exists = ::stat(name.c_str(), &there) == 0;
   if (exists && (S_ISFIFO(there.st_mode) || S_ISCHR(there.st_mode))) return Kind::kStream;
   if (exists && !S_ISREG(there.st_mode)) return unsupported("neither a file, a FIFO nor a device");
   if (!name.ends_with(".y4m"))
-    return unsupported("live video goes to - (standard output), a FIFO or x.y4m");
+    return unsupported("live video goes to - (standard output), /dev/videoN, a FIFO or x.y4m");
   return Kind::kFile;
 }
 
@@ -62,6 +62,13 @@ Result<LiveOutput> LiveOutput::open(const std::string& name, const Options& opti
   const Result<Kind> kind = kind_of(name);
   if (!kind.ok()) return kind.status();
   LiveOutput output;
+  if (*kind == Kind::kVideoDevice) {
+    Result<std::unique_ptr<V4l2Sink>> device =
+        V4l2Sink::open(name, options.size, {.frames_per_second = options.frames_per_second});
+    if (!device.ok()) return device.status();
+    output.sink_ = std::move(*device);
+    return output;
+  }
   int descriptor = STDOUT_FILENO;
   std::string shown = "standard output";
   if (*kind == Kind::kStandardOutput) {

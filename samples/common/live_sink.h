@@ -34,6 +34,8 @@ class LiveSink {
 
   // What frames must be.
   virtual PixelFormat format() const = 0;
+  // By which matrix, where that format is YCbCr.
+  virtual YcbcrMatrix matrix() const { return YcbcrMatrix::kBt601; }
 
   // Whether the frame of due_ns is too late, because the one after it is due already; counted as
   // dropped then. For callers that ask before they render.

@@ -24,12 +24,14 @@ Status draw(LiveLoop& loop, double time_s, RenderedFrame& frame) {
   const Result<std::span<const FrameAvatar>> posed = loop.scene.pose_at(time_s);
   if (!posed.ok()) return posed.status();
   const Camera& camera = loop.camera.step(mean_place(loop.scene), 1 / loop.frames_per_second);
+  ImageTarget target = frame.target();
+  target.matrix = loop.sink.matrix();
   return loop.renderer.render({.camera = camera,
                                .avatars = *posed,
                                .background = loop.background,
                                .leave_out = loop.leave_out,
                                .approximation = loop.approximation},
-                              frame.target());
+                              target);
 }
 
 // Everything but how it ended, into run.

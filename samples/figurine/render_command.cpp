@@ -82,7 +82,7 @@ Result<Job> prepare(const RenderOptions& options) {
   for (const std::string& output : options.outputs) {
     if (!output.starts_with("/dev/video")) continue;
     return Status(StatusCode::kUnsupported,
-                  output + ": video devices are unsupported in this build");
+                  output + ": a video device shows what figurine live draws");
   }
   Result<Background> background =
       parse_background(options.background.empty() ? "alpha" : options.background);

@@ -1,7 +1,7 @@
 """What `figurine live` does in time: latency and dropped frames, poses over VMC, hostile packets.
 
     scripts/run python3 scripts/experiments/live.py BUILD [OUTPUT] [--seconds 600]
-        [--fuzz-runs 10000000] [--rates 30 60]
+        [--fuzz-runs 10000000] [--rates 30 60] [--vivid GUEST]
 
 BUILD is a build folder with figurine, vmc_send and what they need; the build type is for the caller
 to choose (RelWithDebInfo or Release, for figures that are quoted). Each run: vmc_send plays the
@@ -12,6 +12,9 @@ process that does nothing but count. Latency is from a datagram's arrival until 
 byte was taken. The shipped motions go through motion -> VMC -> pose for the error in degrees, and
 Clang's libFuzzer, which this script builds with the address sanitizer, runs the OSC parser from the
 seeds in tests/fuzz/osc.
+
+With --vivid the frames and errors of a virtual video device are rows too: GUEST is vivid_guest of
+the preset aarch64, the kernel that of `scripts/setup vivid` (tests/ports/v4l2/vivid_test.py).
 
 Writes OUTPUT (docs/results/live.json): "summary", "targets", and "rows", a run each. Shorter runs
 (--seconds, --fuzz-runs) are for trying; the file says how long they were. A run that misses a
@@ -132,6 +135,16 @@ def fuzz(runs, folder):
     return {**units, "executions_per_second": int(rate.group(1))}
 
 
+def vivid(guest):
+    """What the kernel's virtual video device did with our frames, a line a check."""
+    done = subprocess.run([sys.executable, "tests/ports/v4l2/vivid_test.py", str(guest),
+                           os.environ["FIGURINE_VIVID"]], capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"live.py: vivid: {done.stdout[-4000:]}{done.stderr}")
+    checks = re.findall(r"^ok +(.*?)\r?$", done.stdout, re.MULTILINE)
+    return {"passed": len(checks), "checks": checks}
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build", type=pathlib.Path)
@@ -140,6 +153,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=600)
     parser.add_argument("--fuzz-runs", type=int, default=TARGETS["osc_fuzz_executions"])
     parser.add_argument("--rates", type=int, nargs="+", default=[30, 60])
+    parser.add_argument("--vivid", type=pathlib.Path)
     options = parser.parse_args()
     tools = {"figurine": options.build / "samples/figurine/figurine",
              "vmc_send": options.build / "tests/ports/vmc_send"}
@@ -153,6 +167,7 @@ def main():
                 for neighbour in (False, True) for rate in options.rates]
         trips = round_trips(tools)
         fuzzed = fuzz(options.fuzz_runs, folder)
+    video_device = vivid(options.vivid) if options.vivid else None
     machine = rows[0]["machine"]
     for row in rows:
         del row["machine"]
@@ -176,6 +191,7 @@ def main():
         "rows": rows,
         "round_trips": trips,
         "fuzzer": fuzzed,
+        **({"vivid": video_device} if video_device else {}),
     }
     results.write(options.output, report)
     print(json.dumps(summary, indent=1))

@@ -707,7 +707,7 @@ TEST_F(Cli, BadInputGetsOneLineAndNoFile) {
   expect_refused("render P/avatar.fgn --camera none.json -o x.png", 1, "none.json");
   expect_refused("render P/avatar.fgn --camera orbit:0,95,3 -o x.png", 1, "elevation");
   expect_refused("render P/avatar.fgn -o x.tga", 1, "x.tga");
-  expect_refused("render P/avatar.fgn -o /dev/video0", 1, "unsupported in this build");
+  expect_refused("render P/avatar.fgn -o /dev/video0", 1, "figurine live");
   expect_refused("render P/avatar.fgn -o no/such/folder/x.png", 1, "no/such/folder/x.png");
   expect_refused("render P/avatar.fgn --background alpha -o x.y4m", 1, "alpha");
   expect_refused("render P/avatar.fgn", 1, "nothing to write");

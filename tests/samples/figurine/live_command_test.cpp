@@ -181,6 +181,7 @@ TEST_F(LiveCommand, BadInputGetsOneLineAndNoFile) {
   refused("--pose vmc:39539 -o x.y4m", 1, "not vmc://");
   refused("--pose motion.fgn -o x.mp4", 1, "x.mp4: live video goes to");
   refused("--pose motion.fgn -o window", 1, "no window in this build");
+  refused("--pose motion.fgn -o /dev/video7777", 1, "/dev/video7777: cannot be opened for writing");
   refused("--pose motion.fgn -o no/such/x.y4m", 1, "no/such/x.y4m");
   refused("--pose motion.fgn -o .", 1, "neither a file");
   refused("--pose motion.fgn --background alpha -o x.y4m", 1, "chroma key");
