@@ -1,10 +1,11 @@
-"""samples/arm_avatar: the folder is whole, finds its own libraries, and draws the walking avatar on
-the emulated core.
+"""samples/arm_avatar: the folder is whole, finds its own libraries, draws the walking avatar on the
+emulated core, and streams it.
 
     arm_avatar_test.py BUILD EMULATOR...
 
 The folder is moved after it was made; nothing but the C library comes from outside.
 """
+import json
 import pathlib
 import shutil
 import struct
@@ -86,6 +87,23 @@ class ArmAvatar(unittest.TestCase):
                             f"{covered} pixels in {tall} rows are no walker")
             self.assertFalse(any(row[0] > 127 or row[-1] > 127 for row in rows),
                              "something touches the picture's sides")
+
+    def test_streams_the_walker_live(self):
+        page = (self.folder / "README.md").read_text(encoding="utf-8")
+        command = next(
+            line.split() for line in page.splitlines() if line.startswith("    ./figurine live"))
+        for word, instead in {"512x512": "64x64", "30": "1", "-": "live.y4m"}.items():
+            command[command.index(word)] = instead
+        run = subprocess.run([*EMULATOR, *command, "--frames", "3", "--json", "live.json"],
+                             cwd=self.folder, capture_output=True, text=True, check=False)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        said = json.loads((self.folder / "live.json").read_text(encoding="utf-8"))
+        stream = (self.folder / "live.y4m").read_bytes()
+        head, frame = stream.index(b"\n") + 1, 6 + 64 * 64 * 3 // 2
+        self.assertEqual(len(stream) - head, said["shown_frames"] * frame)
+        self.assertEqual(said["shown_frames"] + said["dropped_frames"], 3)
+        self.assertGreaterEqual(said["shown_frames"], 2, "a second for each is plenty")
+        self.assertNotEqual(stream[head:head + frame], stream[-frame:])
 
 
 if __name__ == "__main__":
