@@ -91,7 +91,7 @@ def draw(program, folder, size, start, step, below_px):
     work = json.loads(run.stdout)["work"]
     if work["networks"] != (0.5 if below_px else 1.0):
         sys.exit(f"{' '.join(command)}: {work}")
-    return read_rgba(sorted(pathlib.Path(folder).glob(f"{kind}_*.png"))[1])
+    return read_rgba(pathlib.Path(folder, f"{kind}_{start + step:04d}.png"))
 
 
 def main():
