@@ -108,6 +108,9 @@ Result<std::unique_ptr<PoseFeed>> open_feed(const LiveOptions& options, const Pl
   return std::unique_ptr<PoseFeed>(std::move(*feed));
 }
 
+// A camera from a file stays where the file has it.
+bool follows(const CameraPathOptions& options) { return options.follow && !options.camera.fixed; }
+
 // Where the camera begins. It must frame what is to come: all of a motion, else the golden pose.
 Result<Camera> first_camera(const Plan& plan, Scene& scene, Renderer& renderer) {
   const Result<std::vector<uint32_t>> frames = scene.frames({});
@@ -205,7 +208,7 @@ Status run_live_command(LiveOptions options) {
                 .renderer = **renderer,
                 .sink = output->sink(),
                 .feed = feed,
-                .camera = FollowCamera(*camera, place, plan->camera_path.follow),
+                .camera = FollowCamera(*camera, place, follows(plan->camera_path)),
                 .size = size,
                 .background = plan->background,
                 .leave_out = options.omissions.leave_out(),

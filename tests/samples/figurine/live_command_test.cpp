@@ -82,6 +82,28 @@ TEST_F(LiveCommand, AFileHasTheFramesThatRenderDraws) {
   for (const std::string& name : folder_.names()) EXPECT_FALSE(name.ends_with(".tmp")) << name;
 }
 
+// The motion walks away: a camera that went along would see other pictures.
+TEST_F(LiveCommand, ACameraFromAFileStaysWhereItIs) {
+  const auto render = [&](const std::string& arguments) {
+    const ProgramRun result =
+        run_figurine("render avatar.fgn --motion motion.fgn --size 32x32 " + arguments,
+                     {.folder = folder_.path()});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.out;
+  };
+  folder_.write("camera.json", Json::parse(render("--json -o first.png"))["camera"].dump());
+  render("--camera camera.json --background '#dbe0e6' --fps 30 -o all.y4m");
+  const ProgramRun result =
+      run("--pose motion.fgn --camera camera.json --fps 5 --frames 5 -o x.y4m");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::vector<std::string> all = frames(folder_.read("all.y4m"), "30:1"),
+                                 got = frames(folder_.read("x.y4m"), "5:1");
+  EXPECT_EQ(all.size(), 12u);
+  EXPECT_FALSE(got.empty());
+  for (const std::string& frame : got)
+    EXPECT_NE(std::find(all.begin(), all.end(), frame), all.end());
+}
+
 TEST_F(LiveCommand, LinesOfBothKindsMoveTheFigure) {
   const std::string quaternion = R"({"joints": {"joint2": [0.9, 0, 0, 0.4]}})",
                     axis =
