@@ -31,6 +31,10 @@ struct DeviceOptions {
   Result<RendererOptions> renderer_options() const;
   // As asked for; without, the renderer's own choice. renderer_options() has looked at it.
   std::optional<Precision> network_precision() const;
+  // Of packages that are opened to be drawn.
+  OpenOptions open_options() const {
+    return OpenOptions::for_drawing(network_precision().value_or(Precision::kFixedPoint));
+  }
   Result<Isa> instruction_set() const;
 };
 

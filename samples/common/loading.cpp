@@ -1,6 +1,7 @@
 #include "samples/common/loading.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -58,17 +59,19 @@ std::vector<std::string> first_body_folders(const std::filesystem::path& own) {
 
 }  // namespace
 
-Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path) {
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path,
+                                                    const OpenOptions& options) {
   Result<ports::MappedFile> file = ports::MappedFile::open(path);
   if (!file.ok()) return file.status();
-  Result<Package> package = Package::open(file->bytes(), path);
+  Result<Package> package = Package::open(file->bytes(), path, options);
   if (!package.ok()) return package.status();
   return std::make_unique<LoadedPackage>(
       LoadedPackage{path, std::move(*file), std::move(*package)});
 }
 
-Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted) {
-  Result<std::unique_ptr<LoadedPackage>> loaded = load_package(path);
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted,
+                                                    const OpenOptions& options) {
+  Result<std::unique_ptr<LoadedPackage>> loaded = load_package(path, options);
   if (loaded.ok() && (*loaded)->package.kind() != wanted) {
     return Status(StatusCode::kInvalidArgument, path + ": kind: is a package of kind " +
                                                     to_string((*loaded)->package.kind()) +
@@ -112,9 +115,10 @@ Status open_population_member(const Population& population, const std::string& p
 
 }  // namespace
 
-Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name) {
+Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name,
+                                                  const OpenOptions& options) {
   const auto [path, member] = split_member(name);
-  Result<std::unique_ptr<LoadedPackage>> package = load_package(path);
+  Result<std::unique_ptr<LoadedPackage>> package = load_package(path, options);
   if (!package.ok()) return package.status();
   auto loaded = std::make_unique<LoadedAvatar>(LoadedAvatar{name, std::move(*package), {}, {}});
   const Package& opened = loaded->package->package;
@@ -146,6 +150,15 @@ Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar,
 
 namespace {
 
+// Of a file that is a body's package by its header and index; none of another.
+std::optional<std::array<uint64_t, 2>> body_hash(const std::string& path) {
+  const Result<ports::MappedFile> file = ports::MappedFile::open(path);
+  if (!file.ok()) return std::nullopt;
+  const Result<PackageIdentity> identity = Package::identify(file->bytes(), path);
+  if (!identity.ok() || identity->kind != PackageKind::kBody) return std::nullopt;
+  return identity->content_hash;
+}
+
 // A search for one body, and what it has met: for the message if it fails.
 struct BodySearch {
   const Avatar& wanted;
@@ -155,11 +168,15 @@ struct BodySearch {
   std::unique_ptr<LoadedPackage> look_in(const std::string& folder) {
     looked_in += (looked_in.empty() ? "" : ", ") + folder;
     for (const std::string& path : packages_in(folder)) {
-      Result<std::unique_ptr<LoadedPackage>> candidate = load_package(path);
-      if (!candidate.ok() || (*candidate)->package.kind() != PackageKind::kBody) continue;
-      if ((*candidate)->package.content_hash() == wanted.body_hash) return std::move(*candidate);
-      others += (others.empty() ? "" : ", ") + path + " is " +
-                format_hash((*candidate)->package.content_hash());
+      const std::optional<std::array<uint64_t, 2>> hash = body_hash(path);
+      if (!hash) continue;
+      if (*hash == wanted.body_hash) {
+        Result<std::unique_ptr<LoadedPackage>> body =
+            load_package(path, OpenOptions::for_drawing());
+        if (body.ok()) return std::move(*body);
+        continue;
+      }
+      others += (others.empty() ? "" : ", ") + path + " is " + format_hash(*hash);
     }
     return nullptr;
   }
@@ -175,7 +192,8 @@ Result<std::unique_ptr<LoadedPackage>> find_body(const Avatar& wanted, const std
     return fits.ok() ? Result(std::move(body)) : fits.within(name + " on " + body->path);
   };
   if (!body_option.empty()) {
-    Result<std::unique_ptr<LoadedPackage>> body = load_package(body_option, PackageKind::kBody);
+    Result<std::unique_ptr<LoadedPackage>> body =
+        load_package(body_option, PackageKind::kBody, OpenOptions::for_drawing());
     return body.ok() ? checked(std::move(*body)) : std::move(body);
   }
   std::filesystem::path own = std::filesystem::path(beside).parent_path();

@@ -21,10 +21,12 @@ struct LoadedPackage {
 
 // kNotFound, kCorrupt... as the file and the reader say; kInvalidArgument names both kinds if it is
 // another one than wanted.
-Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted);
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, PackageKind wanted,
+                                                    const OpenOptions& options = {});
 
 // Of any kind.
-Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path);
+Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path,
+                                                    const OpenOptions& options = {});
 
 // An avatar from a package of its own, or a member of a population.
 struct LoadedAvatar {
@@ -36,13 +38,15 @@ struct LoadedAvatar {
 
 // "PATH" of an avatar, or "PATH#MEMBER" of a population, MEMBER a name or a number counted from 0.
 // One line says so if the package is of the other kind or has no such member.
-Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name);
+Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name,
+                                                  const OpenOptions& options = {});
 
 // The body that an avatar was made for: body_option if given (it must be the right one), else the
 // .fgn files beside the avatar, else those of the folders in FIGURINE_PATH (colon-separated), else
 // those of the folders beside the avatar's own (samplers/x.fgn stands on populations/y.fgn). Found
-// by content hash, whatever the file is called. Errors name the hash that is wanted and the hashes
-// that were found.
+// by content hash, whatever the file is called; of other packages that lie there header and index
+// alone are read. Without what no command uses (OpenOptions::for_drawing). Errors name the hash
+// that is wanted and the hashes that were found.
 Result<std::unique_ptr<LoadedPackage>> find_body(const LoadedAvatar& avatar,
                                                  const std::string& body_option);
 // The same of an avatar that is no file yet: name is what messages call it, beside the path of what

@@ -97,7 +97,7 @@ PoseView Scene::Figure::recorded_pose(uint32_t frame) const {
 
 Status Scene::load_packages(const SceneOptions& options, size_t index,
                             std::span<const Figure> others, Figure& figure) {
-  Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.avatars[index]);
+  Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.avatars[index], options.open);
   if (!avatar.ok()) return avatar.status();
   figure.avatar = std::move(*avatar);
   Result<std::shared_ptr<LoadedPackage>> body = body_of(*figure.avatar, options.body, others);
@@ -119,7 +119,7 @@ Status Scene::load_coarse(const SceneOptions& options, size_t index, std::span<c
                           Figure& figure) {
   if (options.coarse.empty()) return {};
   Result<std::unique_ptr<LoadedAvatar>> coarse =
-      load_avatar(options.coarse[options.coarse.size() == 1 ? 0 : index]);
+      load_avatar(options.coarse[options.coarse.size() == 1 ? 0 : index], options.open);
   if (!coarse.ok()) return coarse.status();
   figure.coarse = std::move(*coarse);
   Result<std::shared_ptr<LoadedPackage>> body = body_of(*figure.coarse, "", std::span(&figure, 1));

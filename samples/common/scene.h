@@ -28,6 +28,8 @@ struct SceneOptions {
   // Above 1: so many of every avatar in rows and columns, looking everywhere, each at a moment of
   // its own of what they do.
   uint32_t crowd = 1;
+  // What the avatars' packages are opened for.
+  OpenOptions open;
 };
 
 class Scene {

@@ -29,7 +29,9 @@ Status run_export(const ExportOptions& options) {
   if (!renderer_options.ok()) return renderer_options.status();
   if (!options.output.ends_with(".ply"))
     return Status(StatusCode::kUnsupported, options.output + ": Gaussians are exported as .ply");
-  Result<Scene> scene = Scene::load(options.scene);
+  SceneOptions wanted = options.scene;
+  wanted.open = options.device.open_options();
+  Result<Scene> scene = Scene::load(wanted);
   if (!scene.ok()) return scene.status();
   const Result<std::vector<uint32_t>> frames =
       scene->frames({.first = options.frame, .end = options.frame + 1});

@@ -92,7 +92,9 @@ Result<Job> prepare(const RenderOptions& options) {
     background->colour = kPlainBackground;
   }
 
-  Result<Scene> scene = Scene::load(options.scene);
+  SceneOptions wanted = options.scene;
+  wanted.open = options.device.open_options();
+  Result<Scene> scene = Scene::load(wanted);
   if (!scene.ok()) return scene.status();
   // One image of a motion is its first frame, unless a frame is named; a sequence is all of it.
   const auto is_sequence = [](const std::string& output) {

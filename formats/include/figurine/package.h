@@ -5,13 +5,15 @@
 // (XXH3-64 of the index and of every blob), the flatbuffers Verifier with tight limits, then
 // meaning (shapes x type = bytes, finite values, positive scales, parents before children, declared
 // budgets). After that no access can fail, and views point into the caller's bytes: keep them
-// mapped and unchanged while a view lives.
+// mapped and unchanged while a view lives. What a use says that it does not want (OpenOptions) is
+// neither verified nor there: its bytes are never read, so a memory map never pages them in.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -108,13 +110,45 @@ struct TensorInfo {
   uint64_t offset_bytes = 0;
   uint64_t size_bytes = 0;
   uint64_t checksum = 0;
+  bool wanted = true;  // false: OpenOptions left it out, its bytes were not looked at
+};
+
+// Which parts of a package a use wants; all of them unless said. Header and index are always read.
+// What is left out is absent from the views (empty spans), as if the package had never had it, and
+// damage in it stays unseen: who checks packages opens them whole (figurine-inspect does).
+struct OpenOptions {
+  // An avatar's weights in this precision alone, where the package holds them in both; it keeps
+  // what it has where it holds one.
+  std::optional<Precision> precision;
+  bool golden_picture = true;   // the PNG of an avatar's golden frame
+  bool pose_statistics = true;  // of an avatar
+  bool mesh_places = true;      // Body::texel_triangle, texel_barycentric
+
+  // What drawing takes. precision: that networks will run in.
+  static OpenOptions for_drawing(std::optional<Precision> precision = Precision::kFixedPoint) {
+    return {.precision = precision,
+            .golden_picture = false,
+            .pose_statistics = false,
+            .mesh_places = false};
+  }
+};
+
+// What header and index say of a package.
+struct PackageIdentity {
+  PackageKind kind = PackageKind::kBody;
+  uint32_t version = 0;
+  std::array<uint64_t, 2> content_hash{0, 0};  // Package::content_hash()
 };
 
 class Package {
  public:
   // bytes must be 64-byte aligned (a memory map or an aligned buffer is) and outlive the Package.
   // name appears in messages.
-  static Result<Package> open(std::span<const std::byte> bytes, const std::string& name);
+  static Result<Package> open(std::span<const std::byte> bytes, const std::string& name,
+                              const OpenOptions& options = {});
+  // By header and index alone, both verified; nothing else is read. Errors as of open() so far.
+  static Result<PackageIdentity> identify(std::span<const std::byte> bytes,
+                                          const std::string& name);
 
   Package(Package&&) noexcept;
   Package& operator=(Package&&) noexcept;

@@ -136,6 +136,10 @@ Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, cons
         blobs.read(name + ".scale", {layer.out_channels}, convolution.weight_scale));
     FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, convolution.bias));
   }
+  if (!blobs.wanted().fixed_point) {
+    out = {};
+    return {};
+  }
   return validate_fixed_point(network, out);
 }
 
@@ -298,6 +302,10 @@ Status read_pose_statistics(const schema::PoseStatistics& table, std::string_vie
   const uint32_t n = static_cast<uint32_t>(out.joints.size()) * 3;
   FIG_RETURN_IF_ERROR(blobs.read("pose.mean", {n}, out.mean));
   FIG_RETURN_IF_ERROR(blobs.read("pose.covariance", {n, n}, out.covariance));
+  if (!blobs.wanted().pose_statistics) {
+    out = {};
+    return {};
+  }
   FIG_RETURN_IF_ERROR(check_magnitude(out.mean, "pose.mean", 100));
   return check_covariance(out.covariance, n, "pose.covariance");
 }
@@ -391,7 +399,8 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
   }
   if (table.golden() != nullptr)
     FIG_RETURN_IF_ERROR(read_golden(*table.golden(), blobs, out.golden));
-  if (!out.holds(Precision::kFixedPoint) &&
+  // By the package, not by what is wanted of it.
+  if (out.has_network() && table.fixed_point() == nullptr &&
       out.golden.fixed_point_hash != std::array<uint64_t, 2>{0, 0}) {
     return corrupt("golden.fixed_point_hash", "is there, a network in fixed point is not");
   }

@@ -69,9 +69,17 @@ Status checked_size(const TensorInfo& info, uint64_t& out) {
   return {};
 }
 
-// One blob of the index. cursor: end of what came before it, moved to the blob's own padded end.
+// What lies in front of a blob. Its padding is looked at where its own last bytes are: on the same
+// page, so that nothing is paged in for it.
+struct Before {
+  std::string name = "the index";
+  uint64_t end = 0;
+  bool wanted = true;
+};
+
+// One blob of the index; it is what lies before the next.
 Status read_blob(const schema::Blob& entry, std::span<const std::byte> bytes,
-                 const std::string& before, uint64_t& cursor, BlobView& blob) {
+                 const WantedParts& wanted, Before& before, BlobView& blob) {
   const std::string_view name = entry.name()->string_view();
   if (name.size() > layout::kMaxBlobNameBytes || !is_blob_name(name))
     return corrupt("index.blobs", "a blob's name is not [a-z0-9_.]{1,64}");
@@ -98,20 +106,49 @@ Status read_blob(const schema::Blob& entry, std::span<const std::byte> bytes,
     return corrupt(name, "does not lie at a multiple of 64 bytes");
   if (extent.offset() > bytes.size() || extent.size() > bytes.size() - extent.offset())
     return corrupt(name, "reaches past the end of the file");
-  if (extent.offset() < cursor) return corrupt(name, "overlaps ", before);
-  if (extent.offset() > layout::align_up(cursor))
-    return corrupt(name, "leaves a gap after ", before);
-  FIG_RETURN_IF_ERROR(check_zero(bytes, cursor, extent.offset(), before));
+  if (extent.offset() < before.end) return corrupt(name, "overlaps ", before.name);
+  if (extent.offset() > layout::align_up(before.end))
+    return corrupt(name, "leaves a gap after ", before.name);
+  if (before.wanted)
+    FIG_RETURN_IF_ERROR(check_zero(bytes, before.end, extent.offset(), before.name));
   blob.bytes = bytes.subspan(extent.offset(), extent.size());
-  if (extent.checksum() != xxh3_64(blob.bytes))
+  blob.info.wanted = wanted.holds(name);
+  if (blob.info.wanted && extent.checksum() != xxh3_64(blob.bytes))
     return corrupt(name, "checksum does not match, the blob is damaged");
-  cursor = extent.offset() + extent.size();
+  before = {blob.info.name, extent.offset() + extent.size(), blob.info.wanted};
   return {};
 }
 
 }  // namespace
 
-Result<Container> open_container(std::span<const std::byte> bytes) {
+WantedParts WantedParts::of(const OpenOptions& options, const schema::Index& index) {
+  WantedParts wanted;
+  wanted.mesh_places = options.mesh_places;
+  const schema::Avatar* avatar = index.content_as_Avatar();
+  if (avatar == nullptr) return wanted;
+  wanted.golden_picture = options.golden_picture;
+  wanted.pose_statistics = options.pose_statistics;
+  const bool has_fixed_point = avatar->fixed_point() != nullptr;
+  bool has_floats = false;
+  for (const schema::Blob* blob : *index.blobs())
+    has_floats = has_floats || blob->name()->string_view().starts_with("network.");
+  if (has_fixed_point && has_floats && options.precision) {
+    wanted.float_weights = *options.precision == Precision::kFloat32;
+    wanted.fixed_point = !wanted.float_weights;
+  }
+  return wanted;
+}
+
+bool WantedParts::holds(std::string_view name) const {
+  if (name.starts_with("network.")) return float_weights;
+  if (name.starts_with("fixed.")) return fixed_point;
+  if (name == "golden.png") return golden_picture;
+  if (name == "pose.mean" || name == "pose.covariance") return pose_statistics;
+  if (name == "body.texel_triangle" || name == "body.texel_barycentric") return mesh_places;
+  return true;
+}
+
+Result<Container> open_index(std::span<const std::byte> bytes) {
   if (reinterpret_cast<uintptr_t>(bytes.data()) % kBlobAlignment != 0) {
     return Status(StatusCode::kInvalidArgument,
                   "the package's bytes are not 64-byte aligned in memory");
@@ -138,27 +175,34 @@ Result<Container> open_container(std::span<const std::byte> bytes) {
     return corrupt("index.content", "is not of the header's kind");
   container.content_hash = xxh3_128(bytes.first(size_t{header.index_offset} + header.index_bytes));
 
+  return container;
+}
+
+Result<Container> open_container(std::span<const std::byte> bytes, const OpenOptions& options) {
+  Result<Container> opened = open_index(bytes);
+  if (!opened.ok()) return opened;
+  Container& container = *opened;
+  container.wanted = WantedParts::of(options, *container.index);
   const auto& entries = *container.index->blobs();
   if (entries.size() > layout::kMaxBlobs)
     return over_limit("index.blobs", "more than ", layout::kMaxBlobs);
   container.blobs.resize(entries.size());
-  uint64_t cursor = uint64_t{header.index_offset} + header.index_bytes;
-  std::string before = "the index";
+  Before before{.end = uint64_t{container.header.index_offset} + container.header.index_bytes};
   std::set<std::string_view> names;
   for (uint32_t i = 0; i < entries.size(); ++i) {
-    FIG_RETURN_IF_ERROR(read_blob(*entries.Get(i), bytes, before, cursor, container.blobs[i]));
-    before = container.blobs[i].info.name;
+    FIG_RETURN_IF_ERROR(
+        read_blob(*entries.Get(i), bytes, container.wanted, before, container.blobs[i]));
     if (!names.insert(container.blobs[i].info.name).second)
-      return corrupt(before, "is there twice");
+      return corrupt(before.name, "is there twice");
   }
-  if (bytes.size() != layout::align_up(cursor))
-    return corrupt("header.file_bytes", "the file does not end after ", before);
-  FIG_RETURN_IF_ERROR(check_zero(bytes, cursor, bytes.size(), before));
-  return container;
+  if (bytes.size() != layout::align_up(before.end))
+    return corrupt("header.file_bytes", "the file does not end after ", before.name);
+  if (before.wanted) FIG_RETURN_IF_ERROR(check_zero(bytes, before.end, bytes.size(), before.name));
+  return opened;
 }
 
-BlobReader::BlobReader(const std::vector<BlobView>& blobs) {
-  for (const BlobView& blob : blobs) entries_[blob.info.name] = {.blob = &blob};
+BlobReader::BlobReader(const Container& container) : wanted_(container.wanted) {
+  for (const BlobView& blob : container.blobs) entries_[blob.info.name] = {.blob = &blob};
 }
 
 Status BlobReader::find(std::string_view name, DataType type, std::initializer_list<uint32_t> shape,
@@ -183,7 +227,7 @@ Status BlobReader::find(std::string_view name, DataType type, std::initializer_l
     return corrupt(name, "has shape ", describe(info.shape), ", expected ", describe(shape));
   }
   entry->second.asked = true;
-  out = entry->second.blob;
+  if (info.wanted) out = entry->second.blob;
   return {};
 }
 

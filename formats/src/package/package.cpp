@@ -103,11 +103,14 @@ Status check_feature(const layout::Header& header, uint64_t feature, bool held, 
 }
 
 // The header promises what the content holds, so that a reader of the header alone can tell.
-Status check_features(const layout::Header& header, const Content& content) {
+// The index says whether there is fixed point, wanted or not.
+Status check_features(const layout::Header& header, const schema::Index& index,
+                      const Content& content) {
   const Avatar* avatar = std::get_if<Avatar>(&content);
-  FIG_RETURN_IF_ERROR(check_feature(header, kFeatureFixedPoint,
-                                    avatar != nullptr && !avatar->fixed_point.empty(),
-                                    "fixed point", "a network is "));
+  FIG_RETURN_IF_ERROR(
+      check_feature(header, kFeatureFixedPoint,
+                    avatar != nullptr && index.content_as_Avatar()->fixed_point() != nullptr,
+                    "fixed point", "a network is "));
   FIG_RETURN_IF_ERROR(check_feature(header, kFeatureStaticPart,
                                     avatar != nullptr && layout::needs_static_feature(*avatar),
                                     "static parts", "an avatar is "));
@@ -120,8 +123,18 @@ Status check_features(const layout::Header& header, const Content& content) {
 
 }  // namespace
 
-Result<Package> Package::open(std::span<const std::byte> bytes, const std::string& name) {
-  const Result<Container> container = open_container(bytes);
+Result<PackageIdentity> Package::identify(std::span<const std::byte> bytes,
+                                          const std::string& name) {
+  const Result<Container> container = open_index(bytes);
+  if (!container.ok()) return container.status().within(name);
+  return PackageIdentity{.kind = static_cast<PackageKind>(container->header.kind),
+                         .version = container->header.version,
+                         .content_hash = container->content_hash};
+}
+
+Result<Package> Package::open(std::span<const std::byte> bytes, const std::string& name,
+                              const OpenOptions& options) {
+  const Result<Container> container = open_container(bytes, options);
   if (!container.ok()) return container.status().within(name);
 
   auto contents = std::make_unique<Contents>();
@@ -134,7 +147,7 @@ Result<Package> Package::open(std::span<const std::byte> bytes, const std::strin
                         .macs_per_frame = index.budget()->macs_per_frame(),
                         .gaussians = index.budget()->gaussians()};
     FIG_RETURN_IF_ERROR(read_provenance(*index.provenance(), contents->provenance));
-    BlobReader blobs(container->blobs);
+    BlobReader blobs(*container);
     switch (static_cast<PackageKind>(container->header.kind)) {
       case PackageKind::kBody:
         FIG_RETURN_IF_ERROR(read_body(index, blobs, contents->content.emplace<Body>()));
@@ -155,7 +168,7 @@ Result<Package> Package::open(std::span<const std::byte> bytes, const std::strin
             read_sampler(index, blobs, contents->budget, contents->content.emplace<Sampler>()));
         break;
     }
-    FIG_RETURN_IF_ERROR(check_features(contents->header, contents->content));
+    FIG_RETURN_IF_ERROR(check_features(contents->header, index, contents->content));
     return blobs.check_all_known();
   };
   if (const Status status = read(); !status.ok()) return status.within(name);
