@@ -58,8 +58,8 @@ Status validate_camera(const Camera& camera) {
 
 Result<Camera> make_orbit_camera(const OrbitCamera& orbit, uint32_t width_px, uint32_t height_px) {
   if (!std::isfinite(orbit.azimuth_deg)) return invalid("orbit azimuth must be finite");
-  if (!(std::abs(orbit.elevation_deg) <= 89))
-    return invalid("orbit elevation must be within -89 and 89 degrees");
+  if (!(std::abs(orbit.elevation_deg) <= 90))
+    return invalid("orbit elevation must be within -90 and 90 degrees");
   if (!(orbit.distance_m > 0) || !std::isfinite(orbit.distance_m))
     return invalid("orbit distance must be positive and finite");
   if (!(orbit.vertical_fov_deg >= 1 && orbit.vertical_fov_deg <= 170))

@@ -2,353 +2,234 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
-#include <string_view>
 
-#include "ports/gaussians/decompose.h"
+#include "ports/gaussians/cloud_builder.h"
+#include "ports/gaussians/compressed_ply.h"
+#include "ports/gaussians/ply_comments.h"
+#include "ports/gaussians/ply_format.h"
 
 namespace figurine::ports {
 
 namespace {
 
-static_assert(std::endian::native == std::endian::little,
-              "multi-byte values are read as they lie in memory, or swapped");
+constexpr size_t kNone = std::numeric_limits<size_t>::max();
+constexpr size_t kNamedProperties = 6;  // of those that are skipped
 
-constexpr size_t kMaxHeaderBytes = 1 << 20;
-constexpr size_t kMaxProperties = 4096;
-constexpr double kMaxLogit = 16;      // sigmoid(16) = 1 - 1.1e-7: one step of a float below 1
-constexpr double kMinLogScale = -30;  // 1e-13 m
-
-enum class Encoding { kAscii, kLittleEndian, kBigEndian };
-enum class Type : uint8_t { kI8, kU8, kI16, kU16, kI32, kU32, kF32, kF64 };
-
-constexpr size_t size_of(Type type) {
-  constexpr size_t kSizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
-  return kSizes[static_cast<size_t>(type)];
-}
-
-std::optional<Type> parse_type(std::string_view word) {
-  constexpr std::pair<std::string_view, Type> kNames[] = {
-      {"char", Type::kI8},    {"int8", Type::kI8},     {"uchar", Type::kU8},
-      {"uint8", Type::kU8},   {"short", Type::kI16},   {"int16", Type::kI16},
-      {"ushort", Type::kU16}, {"uint16", Type::kU16},  {"int", Type::kI32},
-      {"int32", Type::kI32},  {"uint", Type::kU32},    {"uint32", Type::kU32},
-      {"float", Type::kF32},  {"float32", Type::kF32}, {"double", Type::kF64},
-      {"float64", Type::kF64}};
-  for (const auto& [name, type] : kNames) {
-    if (word == name) return type;
-  }
-  return std::nullopt;
-}
-
-struct Property {
-  std::string name;
-  Type type = Type::kF32;
-  std::optional<Type> list_count;  // of a list: the type of its length
+// Where each value of a Gaussian stands in a row of the vertices; kNone: nowhere.
+struct Columns {
+  std::array<size_t, 3> position{};
+  std::array<size_t, 3> colour{};      // f_dc, or red green blue
+  std::array<double, 3> colour_one{};  // of red green blue: what is 1; 0 for f_dc
+  std::array<size_t, 3> scale{};
+  uint32_t scales = 3;
+  std::array<size_t, 4> rotation{};
+  size_t opacity = kNone, filter = kNone;
+  std::vector<size_t> rest;  // [3 * stored_per_channel] channel-major
+  std::vector<bool> used;    // of the row: whether anything above is there
+  ShLayout sh;
+  std::vector<std::string> remarks;
 };
 
-struct Element {
-  std::string name;
-  uint64_t count = 0;
-  std::vector<Property> properties;
-
-  bool has_list() const {
-    return std::any_of(properties.begin(), properties.end(),
-                       [](const Property& p) { return p.list_count.has_value(); });
-  }
-  size_t row_bytes() const {
-    size_t bytes = 0;
-    for (const Property& property : properties) bytes += size_of(property.type);
-    return bytes;
-  }
-};
-
-struct Header {
-  Encoding encoding = Encoding::kLittleEndian;
-  std::vector<Element> elements;
-  size_t size_bytes = 0;
-};
-
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> words;
-  for (size_t at = 0; (at = line.find_first_not_of(" \t\r", at)) != std::string_view::npos;) {
-    const size_t end = std::min(line.find_first_of(" \t\r", at), line.size());
-    words.push_back(line.substr(at, end - at));
-    at = end;
-  }
-  return words;
-}
-
-// A name or word of the file as it may appear in a message: printable and short.
-std::string quoted(std::string_view word) {
-  std::string text = "'";
-  for (const char c : word.substr(0, 40)) text += (c >= 32 && c < 127) ? c : '?';
-  return text + (word.size() > 40 ? "...'" : "'");
-}
-
-Result<Header> parse_header(std::string_view text, const std::string& name) {
-  const auto corrupt = [&](const std::string& what) {
-    return Status(StatusCode::kCorrupt, name + ": ply: " + what);
-  };
-  Header header;
-  bool has_format = false;
-  size_t properties = 0;
-  text = text.substr(0, kMaxHeaderBytes);
-  for (size_t line_number = 1, at = 0;; ++line_number) {
-    const size_t end = text.find('\n', at);
-    if (end == std::string_view::npos) {
-      return line_number == 1 ? corrupt("does not start with 'ply'")
-                              : corrupt("the header has no end_header");
-    }
-    const std::vector<std::string_view> words = split(text.substr(at, end - at));
-    at = end + 1;
-    if (line_number == 1) {
-      if (words.size() != 1 || words[0] != "ply") return corrupt("does not start with 'ply'");
-      continue;
-    }
-    if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
-    if (words[0] == "end_header") {
-      if (!has_format) return corrupt("the header has no format");
-      header.size_bytes = at;
-      return header;
-    }
-    if (words[0] == "format" && words.size() >= 2) {
-      if (words[1] == "ascii") {
-        header.encoding = Encoding::kAscii;
-      } else if (words[1] == "binary_little_endian") {
-        header.encoding = Encoding::kLittleEndian;
-      } else if (words[1] == "binary_big_endian") {
-        header.encoding = Encoding::kBigEndian;
-      } else {
-        return corrupt("unknown format " + quoted(words[1]));
-      }
-      has_format = true;
-    } else if (words[0] == "element" && words.size() == 3) {
-      Element element{.name = std::string(words[1]), .count = 0, .properties = {}};
-      const auto [stop, error] =
-          std::from_chars(words[2].data(), words[2].data() + words[2].size(), element.count);
-      if (error != std::errc() || stop != words[2].data() + words[2].size()) {
-        return corrupt("element " + quoted(words[1]) + " has the count " + quoted(words[2]));
-      }
-      header.elements.push_back(std::move(element));
-    } else if (words[0] == "property" && words.size() >= 3) {
-      if (header.elements.empty()) return corrupt("a property before any element");
-      const bool is_list = words[1] == "list" && words.size() == 5;
-      const std::optional<Type> type = parse_type(words[is_list ? 3 : 1]);
-      const std::optional<Type> list_count = is_list ? parse_type(words[2]) : std::nullopt;
-      if (!type || (is_list && !list_count) || (!is_list && words.size() != 3)) {
-        return corrupt("line " + std::to_string(line_number) + " declares no known property type");
-      }
-      if (++properties > kMaxProperties)
-        return corrupt("more than " + std::to_string(kMaxProperties) + " properties");
-      header.elements.back().properties.push_back({std::string(words.back()), *type, list_count});
-    } else {
-      return corrupt("line " + std::to_string(line_number) +
-                     " is no header line: " + quoted(words[0]));
-    }
-  }
-}
-
-// One value of a binary file, at data.
-double load(const std::byte* data, Type type, bool swap) {
-  std::array<std::byte, 8> bytes{};
-  const size_t size = size_of(type);
-  std::memcpy(bytes.data(), data, size);
-  if (swap) std::reverse(bytes.begin(), bytes.begin() + size);
-  const auto as = [&]<class T>(T) {
-    T value;
-    std::memcpy(&value, bytes.data(), sizeof(T));
-    return static_cast<double>(value);
-  };
-  switch (type) {
-    case Type::kI8:
-      return as(int8_t{});
-    case Type::kU8:
-      return as(uint8_t{});
-    case Type::kI16:
-      return as(int16_t{});
-    case Type::kU16:
-      return as(uint16_t{});
-    case Type::kI32:
-      return as(int32_t{});
-    case Type::kU32:
-      return as(uint32_t{});
-    case Type::kF32:
-      return as(float{});
-    case Type::kF64:
-      return as(double{});
-  }
-  return 0;
-}
-
-// Walks the values of a body, ascii or binary. read() is false at the end of the data or on a word
-// that is no number.
-class Cursor {
+// Finds the columns of a Gaussian's values, and remembers what nobody asked for.
+class ColumnFinder {
  public:
-  Cursor(std::span<const std::byte> body, Encoding encoding) : body_(body), encoding_(encoding) {}
+  explicit ColumnFinder(const PlyElement& vertex)
+      : vertex_(vertex), used_(vertex.properties.size(), false) {}
 
-  bool read(Type type, double& value) {
-    if (encoding_ == Encoding::kAscii) return read_word(value);
-    if (body_.size() - at_ < size_of(type)) return false;
-    value = load(body_.data() + at_, type, encoding_ == Encoding::kBigEndian);
-    at_ += size_of(type);
-    return true;
-  }
+  bool has(const std::string& name) const { return vertex_.find(name).has_value(); }
 
-  // Past one row of an element that nobody asked for.
-  bool skip_row(const Element& element) {
-    double value = 0;
-    for (const Property& property : element.properties) {
-      uint64_t repeat = 1;
-      if (property.list_count) {
-        if (!read(*property.list_count, value) || !(value >= 0 && value <= 4294967295.0))
-          return false;
-        repeat = static_cast<uint64_t>(value);
-        if (repeat > left()) return false;
-      }
-      for (uint64_t i = 0; i < repeat; ++i) {
-        if (!read(property.type, value)) return false;
-      }
+  // Of a property that must be there, once, and be a number.
+  size_t require(const std::string& name) {
+    const size_t column = vertex_.find(name).value_or(kNone);
+    if (column == kNone) {
+      complain("the vertices have no property " + name);
+      return 0;
     }
-    return true;
+    used_[column] = true;
+    if (vertex_.properties[column].list_count) complain("the property " + name + " is a list");
+    const auto twice = [&](const PlyProperty& p) { return p.name == name; };
+    if (std::count_if(vertex_.properties.begin(), vertex_.properties.end(), twice) > 1)
+      complain("the vertices have the property " + name + " twice");
+    return column;
   }
 
-  uint64_t left() const { return body_.size() - at_; }
+  template <size_t N>
+  void require_numbered(const std::string& prefix, std::array<size_t, N>& columns, size_t count) {
+    for (size_t k = 0; k < count; ++k) columns[k] = require(prefix + std::to_string(k));
+  }
+
+  void complain(const std::string& what) {
+    if (error.empty()) error = what;
+  }
+
+  // What is skipped, in one remark; normals are zeros that every file has.
+  std::string skipped() const {
+    std::string text;
+    size_t count = 0;
+    for (size_t i = 0; i < used_.size(); ++i) {
+      const PlyProperty& property = vertex_.properties[i];
+      if (used_[i] || property.name == "nx" || property.name == "ny" || property.name == "nz")
+        continue;
+      if (++count > kNamedProperties) continue;
+      text += (count == 1 ? "" : ", ") + quoted(property.name) +
+              (property.list_count ? " (a list)" : "");
+    }
+    if (count > kNamedProperties)
+      text += " and " + std::to_string(count - kNamedProperties) + " more";
+    return text.empty() ? "" : "skipped " + text;
+  }
+
+  const std::vector<bool>& used() const { return used_; }
+
+  std::string error;
 
  private:
-  bool read_word(double& value) {
-    const char* text = reinterpret_cast<const char*>(body_.data());
-    const auto blank = [](char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r'; };
-    while (at_ < body_.size() && blank(text[at_])) ++at_;
-    size_t end = at_;
-    while (end < body_.size() && !blank(text[end])) ++end;
-    if (end - at_ > 1 && text[at_] == '+' && text[at_ + 1] != '-')
-      ++at_;  // from_chars takes no plus sign
-    const auto [stop, error] = std::from_chars(text + at_, text + end, value);
-    if (error == std::errc::result_out_of_range) {
-      // Too small or too large for a double: which of them does not matter to a float, the sign of
-      // the exponent decides.
-      const std::string_view word(text + at_, end - at_);
-      const bool tiny =
-          word.find("e-") != std::string_view::npos || word.find("E-") != std::string_view::npos;
-      value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
-    } else if (error != std::errc() || stop != text + end) {
-      return false;
-    }
-    at_ = end;
-    return true;
-  }
-
-  std::span<const std::byte> body_;
-  Encoding encoding_;
-  size_t at_ = 0;
+  const PlyElement& vertex_;
+  std::vector<bool> used_;
 };
 
-// Which property of the vertex element each value of a Gaussian comes from.
-struct Columns {
-  std::array<size_t, 3> position, dc, scale;
-  std::array<size_t, 4> rotation;
-  size_t opacity = 0;
-  std::vector<size_t> rest;
-  uint32_t sh_degree = 0;
-};
-
-Result<Columns> find_columns(const Element& vertex, const std::string& name) {
-  const auto find = [&](const std::string& wanted) -> std::optional<size_t> {
-    for (size_t i = 0; i < vertex.properties.size(); ++i) {
-      if (vertex.properties[i].name == wanted) return i;
-    }
-    return std::nullopt;
-  };
-  if (find("packed_position")) {
-    return Status(StatusCode::kUnsupported, name +
-                                                ": ply: compressed Gaussians (packed_position) are "
-                                                "not read; convert to the plain layout");
+void find_colour(const PlyElement& vertex, ColumnFinder& finder, Columns& columns) {
+  constexpr const char* kNames[] = {"red", "green", "blue"};
+  if (finder.has("f_dc_0") || !finder.has("red")) {
+    finder.require_numbered("f_dc_", columns.colour, 3);
+    return;
   }
+  for (size_t k = 0; k < 3; ++k) {
+    columns.colour[k] = finder.require(kNames[k]);
+    switch (vertex.properties[columns.colour[k]].type) {
+      case PlyType::kU8:
+        columns.colour_one[k] = 255;
+        break;
+      case PlyType::kU16:
+        columns.colour_one[k] = 65535;
+        break;
+      case PlyType::kF32:
+      case PlyType::kF64:
+        columns.colour_one[k] = 1;
+        break;
+      default:
+        finder.complain(std::string(kNames[k]) + " is neither uchar, ushort nor a float");
+    }
+  }
+  columns.remarks.emplace_back("colours of red green blue");
+}
+
+void find_shape(ColumnFinder& finder, Columns& columns) {
+  columns.scales = finder.has("scale_2") ? 3 : finder.has("scale_1") ? 2 : 1;
+  finder.require_numbered("scale_", columns.scale, columns.scales);
+  if (columns.scales == 2) columns.remarks.emplace_back("2D Gaussians, drawn as discs");
+  if (columns.scales == 1) columns.remarks.emplace_back("one scale, the same along all axes");
+  if (columns.scales == 1 && !finder.has("rot_0")) {  // nothing to rotate
+    columns.rotation.fill(kNone);
+  } else {
+    finder.require_numbered("rot_", columns.rotation, 4);
+  }
+  if (finder.has("filter_3D")) {
+    columns.filter = finder.require("filter_3D");
+    columns.remarks.emplace_back("filter_3D fused");
+  }
+}
+
+Result<Columns> find_columns(const PlyElement& vertex, const std::string& name) {
+  ColumnFinder finder(vertex);
   Columns columns;
-  std::string missing;
-  const auto require = [&](const std::string& wanted, size_t& column) {
-    const std::optional<size_t> found = find(wanted);
-    if (found) {
-      column = *found;
-    } else if (missing.empty()) {
-      missing = wanted;
-    }
-  };
-  for (int k = 0; k < 3; ++k)
-    require(std::string(1, static_cast<char>('x' + k)), columns.position[k]);
-  for (int k = 0; k < 3; ++k) require("f_dc_" + std::to_string(k), columns.dc[k]);
-  require("opacity", columns.opacity);
-  for (int k = 0; k < 3; ++k) require("scale_" + std::to_string(k), columns.scale[k]);
-  for (int k = 0; k < 4; ++k) require("rot_" + std::to_string(k), columns.rotation[k]);
-  if (!missing.empty())
-    return Status(StatusCode::kCorrupt, name + ": ply: the vertices have no property " + missing);
-  const auto rest_count = static_cast<size_t>(
+  for (size_t k = 0; k < 3; ++k)
+    columns.position[k] = finder.require(std::string(1, static_cast<char>('x' + k)));
+  find_colour(vertex, finder, columns);
+  columns.opacity = finder.require("opacity");
+  find_shape(finder, columns);
+  const auto rest = static_cast<size_t>(
       std::count_if(vertex.properties.begin(), vertex.properties.end(),
-                    [](const Property& p) { return p.name.starts_with("f_rest_"); }));
-  uint32_t degree = 0;
-  while (degree <= kMaxShDegree && 3 * (sh_coefficients(degree) - 1) != rest_count) ++degree;
-  if (degree > kMaxShDegree) {
-    const bool higher = rest_count == 72;  // degree 4
-    return Status(higher ? StatusCode::kUnsupported : StatusCode::kCorrupt,
-                  name + ": ply: " + std::to_string(rest_count) +
-                      " f_rest properties; 0, 9, 24 or 45 (degree 0 to 3) are read");
-  }
-  columns.sh_degree = degree;
-  columns.rest.resize(rest_count);
-  for (size_t k = 0; k < rest_count; ++k) require("f_rest_" + std::to_string(k), columns.rest[k]);
-  if (!missing.empty())
-    return Status(StatusCode::kCorrupt, name + ": ply: the vertices have no property " + missing);
+                    [](const PlyProperty& p) { return p.name.starts_with("f_rest_"); }));
+  if (!find_sh_layout(rest, columns.sh))
+    finder.complain(std::to_string(rest) + " f_rest properties, no multiple of three channels");
+  for (size_t k = 0; k < rest; ++k)
+    columns.rest.push_back(finder.require("f_rest_" + std::to_string(k)));
+  if (!finder.error.empty()) return Status(StatusCode::kCorrupt, name + ": ply: " + finder.error);
+  if (!columns.sh.remark.empty()) columns.remarks.push_back(columns.sh.remark);
+  if (std::string skipped = finder.skipped(); !skipped.empty())
+    columns.remarks.push_back(std::move(skipped));
+  columns.used = finder.used();
   return columns;
 }
 
-// One Gaussian from its row of stored values. False if it cannot be splatted.
-bool append_gaussian(const std::vector<double>& row, const Columns& columns, GaussianCloud& cloud) {
-  float position[3], factor[9], colour[3 * sh_coefficients(kMaxShDegree)];
-  double rotation[4], length2 = 0;
-  for (int k = 0; k < 4; ++k) {
-    rotation[k] = row[columns.rotation[k]];
-    length2 += rotation[k] * rotation[k];
+// One row of stored values in the splatter's units.
+StoredGaussian gaussian_of(const std::vector<double>& row, const Columns& columns, bool flat) {
+  StoredGaussian gaussian;
+  for (size_t k = 0; k < 3; ++k) {
+    gaussian.position_m[k] = row[columns.position[k]];
+    const double colour = row[columns.colour[k]];
+    gaussian.sh[k] = columns.colour_one[k] == 0
+                         ? colour
+                         : (colour / columns.colour_one[k] - double(kShOffset)) / double(kSh0);
   }
-  if (!(length2 > 0) || !std::isfinite(length2)) return false;
-  const double norm = 1 / std::sqrt(length2);
-  const double w = rotation[0] * norm, x = rotation[1] * norm, y = rotation[2] * norm,
-               z = rotation[3] * norm;
-  const double matrix[9] = {
-      1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),  //
-      2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),  //
-      2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
-  const auto narrow = [](double value, float& to) {
-    to = static_cast<float>(value);
-    return std::isfinite(to);
-  };
-  bool finite = true;
-  for (int k = 0; k < 3; ++k) {
-    finite = narrow(row[columns.position[k]], position[k]) && finite;
-    const double scale = std::exp(row[columns.scale[k]]);
-    for (int i = 0; i < 3; ++i)
-      finite = narrow(matrix[3 * i + k] * scale, factor[3 * i + k]) && finite;
-    finite = narrow(row[columns.dc[k]], colour[k]) && finite;
+  const size_t bands = sh_coefficients(columns.sh.degree) - 1;
+  for (size_t channel = 0; channel < 3; ++channel) {
+    for (size_t k = 0; k < bands; ++k) {
+      gaussian.sh[3 * (1 + k) + channel] =
+          row[columns.rest[channel * columns.sh.stored_per_channel + k]];
+    }
   }
-  const size_t per_channel = columns.rest.size() / 3;
-  for (size_t k = 0; k < columns.rest.size();
-       ++k) {  // channel-major in the file, coefficient-major here
-    finite =
-        narrow(row[columns.rest[k]], colour[3 * (1 + k % per_channel) + k / per_channel]) && finite;
+  gaussian.opacity = 1 / (1 + std::exp(-row[columns.opacity]));  // exact 0 and 1 for infinite ones
+  const uint32_t axes = flat ? 2 : columns.scales == 1 ? 3 : columns.scales;
+  for (size_t k = 0; k < axes; ++k) {
+    double& scale = gaussian.scale_m[k];
+    scale = std::exp(row[columns.scale[columns.scales == 1 ? 0 : k]]);
+    if (columns.filter == kNone) continue;
+    // A Gaussian of this width convolved with the filter's, and as much light as before.
+    const double filtered = std::hypot(scale, row[columns.filter]);
+    if (filtered > 0) gaussian.opacity *= scale / filtered;
+    scale = filtered;
   }
-  const double opacity =
-      1 / (1 + std::exp(-row[columns.opacity]));  // exact 0 and 1 for infinite logits
-  if (!finite || std::isnan(opacity)) return false;
-  cloud.position_m.insert(cloud.position_m.end(), position, position + 3);
-  cloud.covariance_factor.insert(cloud.covariance_factor.end(), factor, factor + 9);
-  cloud.opacity.push_back(static_cast<float>(opacity));
-  cloud.sh.insert(cloud.sh.end(), colour, colour + 3 * (1 + per_channel));
-  return true;
+  gaussian.rotation = {1, 0, 0, 0};
+  for (size_t k = 0; k < 4 && columns.rotation[k] != kNone; ++k)
+    gaussian.rotation[k] = row[columns.rotation[k]];
+  return gaussian;
+}
+
+enum class RowState : uint8_t { kWhole, kBroken, kDataEnd };
+
+// Reads the values of one row; kBroken says why in broken. What nobody uses need not be a number.
+RowState read_row(PlyCursor& cursor, const PlyElement& vertex, const std::vector<bool>& used,
+                  std::vector<double>& row, std::string& broken) {
+  broken.clear();
+  cursor.begin_row();
+  for (size_t p = 0; p < row.size(); ++p) {
+    const PlyProperty& property = vertex.properties[p];
+    const PlyCursor::Read read = property.list_count
+                                     ? cursor.skip_list(*property.list_count, property.type)
+                                     : cursor.read(property.type, row[p]);
+    if (read == PlyCursor::Read::kDataEnd) return RowState::kDataEnd;
+    if (read == PlyCursor::Read::kNoNumber && used[p] && broken.empty())
+      broken = property.name + " is no number";
+    if (read == PlyCursor::Read::kRowEnd) {
+      broken = "its line has only " + std::to_string(p) + " values";
+      break;
+    }
+  }
+  if (!cursor.end_row() && broken.empty()) broken = "its line has too many values";
+  return broken.empty() ? RowState::kWhole : RowState::kBroken;
+}
+
+// How many rows of the vertices can lie in what is left of the file. An ascii value takes at least
+// a digit and a blank.
+uint64_t possible_rows(const PlyHeader& header, const PlyElement& vertex, uint64_t left) {
+  if (header.encoding != PlyEncoding::kAscii) return left / vertex.row_bytes();
+  return (left + 1) / (2 * vertex.properties.size());
+}
+
+Status skip_elements(PlyCursor& cursor, std::span<const PlyElement> elements,
+                     const std::string& name) {
+  for (const PlyElement& element : elements) {
+    if (!cursor.skip(element)) {
+      return Status(StatusCode::kCorrupt,
+                    name + ": ply: the data of element " + quoted(element.name) + " ends early");
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -357,97 +238,54 @@ Result<GaussianCloud> read_gaussian_ply(std::span<const std::byte> bytes, const 
   const auto corrupt = [&](const std::string& what) {
     return Status(StatusCode::kCorrupt, name + ": ply: " + what);
   };
-  const Result<Header> header =
-      parse_header({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, name);
+  const Result<PlyHeader> header = parse_ply_header(bytes, name);
   if (!header.ok()) return header.status();
-  const auto vertex = std::find_if(header->elements.begin(), header->elements.end(),
-                                   [](const Element& e) { return e.name == "vertex"; });
-  if (vertex == header->elements.end()) return corrupt("there is no element vertex");
-  if (vertex->has_list())
-    return corrupt("the vertices have a list property, which Gaussians do not");
+  const PlyElement* vertex = header->find("vertex");
+  if (vertex == nullptr) return corrupt("there is no element vertex");
+  if (vertex->find("packed_position")) return read_compressed_ply(bytes, *header, name);
   const Result<Columns> columns = find_columns(*vertex, name);
   if (!columns.ok()) return columns.status();
 
-  Cursor cursor(bytes.subspan(header->size_bytes), header->encoding);
-  for (auto element = header->elements.begin(); element != vertex; ++element) {
-    if (element->properties.empty()) continue;  // rows of nothing, however many
-    for (uint64_t i = 0; i < element->count; ++i) {
-      if (!cursor.skip_row(*element))
-        return corrupt("the data of element " + quoted(element->name) + " ends early");
-    }
-  }
-  // Before anything is reserved: the rows must be able to lie in what is left of the file. An ascii
-  // value takes at least a digit and a blank.
-  const size_t least_row = header->encoding == Encoding::kAscii ? 2 * vertex->properties.size() - 1
-                                                                : vertex->row_bytes();
-  const uint64_t possible = header->encoding == Encoding::kAscii
-                                ? (cursor.left() + 1) / (least_row + 1)
-                                : cursor.left() / least_row;
+  PlyCursor cursor(bytes.subspan(header->size_bytes), header->encoding);
+  const std::span<const PlyElement> elements = header->elements;
+  const auto place = static_cast<size_t>(vertex - elements.data());
+  FIG_RETURN_IF_ERROR(skip_elements(cursor, elements.first(place), name));
+  // Before anything is reserved: the rows must be able to lie in what is left of the file.
+  const uint64_t possible = possible_rows(*header, *vertex, cursor.left());
   if (vertex->count > possible || vertex->count > std::numeric_limits<uint32_t>::max()) {
     return corrupt("declares " + std::to_string(vertex->count) +
                    " vertices, the data holds at most " + std::to_string(possible));
   }
-  GaussianCloud cloud;
-  cloud.sh_degree = columns->sh_degree;
-  const size_t count = vertex->count;
-  cloud.position_m.reserve(3 * count);
-  cloud.covariance_factor.reserve(9 * count);
-  cloud.opacity.reserve(count);
-  cloud.sh.reserve(3 * size_t(sh_coefficients(cloud.sh_degree)) * count);
+
+  const PlyDrawing drawing = read_drawing_comments(header->comments);
+  CloudBuilder builder("ply", columns->sh.degree, vertex->count);
   std::vector<double> row(vertex->properties.size());
+  std::string broken;
   for (uint64_t i = 0; i < vertex->count; ++i) {
-    for (size_t p = 0; p < row.size(); ++p) {
-      if (!cursor.read(vertex->properties[p].type, row[p])) {
-        return corrupt("vertex " + std::to_string(i) + " has no number for " +
-                       vertex->properties[p].name);
-      }
+    switch (read_row(cursor, *vertex, columns->used, row, broken)) {
+      case RowState::kDataEnd:
+        return corrupt("declares " + std::to_string(vertex->count) +
+                       " vertices, the data ends in number " + std::to_string(i));
+      case RowState::kBroken:
+        builder.leave_out(i, broken);
+        break;
+      case RowState::kWhole:
+        builder.add(i, gaussian_of(row, *columns, drawing.flat));
     }
-    if (!append_gaussian(row, *columns, cloud)) ++cloud.left_out;
   }
-  return cloud;
-}
-
-std::vector<std::byte> write_gaussian_ply(const GaussianView& gaussians,
-                                          const std::vector<std::string>& comments) {
-  const uint32_t coefficients = sh_coefficients(gaussians.sh_degree), rest = coefficients - 1;
-  std::string header = "ply\nformat binary_little_endian 1.0\n";
-  for (const std::string& comment : comments) header += "comment " + comment + "\n";
-  header += "element vertex " + std::to_string(gaussians.count) + "\n";
-  const auto declare = [&](const std::string& property) {
-    header += "property float " + property + "\n";
-  };
-  for (const char* property : {"x", "y", "z", "nx", "ny", "nz"}) declare(property);
-  for (int k = 0; k < 3; ++k) declare("f_dc_" + std::to_string(k));
-  for (uint32_t k = 0; k < 3 * rest; ++k) declare("f_rest_" + std::to_string(k));
-  declare("opacity");
-  for (int k = 0; k < 3; ++k) declare("scale_" + std::to_string(k));
-  for (int k = 0; k < 4; ++k) declare("rot_" + std::to_string(k));
-  header += "end_header\n";
-
-  const size_t floats = 6 + 3 * size_t(coefficients) + 1 + 3 + 4;
-  std::vector<std::byte> bytes(header.size() + floats * sizeof(float) * gaussians.count);
-  std::memcpy(bytes.data(), header.data(), header.size());
-  std::vector<float> row(floats);
-  for (uint32_t i = 0; i < gaussians.count; ++i) {
-    float* to = row.data();
-    to = std::copy_n(&gaussians.position_m[3 * size_t(i)], 3, to);
-    to = std::fill_n(to, 3, 0.0f);
-    const float* colour = &gaussians.sh[3 * size_t(coefficients) * i];
-    to = std::copy_n(colour, 3, to);
-    for (int channel = 0; channel < 3; ++channel) {
-      for (uint32_t k = 1; k <= rest; ++k) *to++ = colour[3 * k + channel];
-    }
-    const double opacity = gaussians.opacity[i];
-    *to++ = static_cast<float>(
-        std::clamp(std::log(opacity) - std::log1p(-opacity), -kMaxLogit, kMaxLogit));
-    const ScaleRotation shape = decompose(&gaussians.covariance_factor[9 * size_t(i)]);
-    for (const double scale : shape.scale)
-      *to++ = static_cast<float>(std::max(std::log(scale), kMinLogScale));
-    for (const double value : shape.quaternion) *to++ = static_cast<float>(value);
-    std::memcpy(bytes.data() + header.size() + floats * sizeof(float) * i, row.data(),
-                floats * sizeof(float));
+  FIG_RETURN_IF_ERROR(skip_elements(cursor, elements.subspan(place + 1), name));
+  if (!cursor.only_blanks_left()) {
+    // In ascii without lines a row of another length has shifted all that follow.
+    if (header->encoding == PlyEncoding::kAscii) return corrupt("has more values than it declares");
+    builder.remark(std::to_string(cursor.left()) + " bytes behind the last element not read");
   }
-  return bytes;
+
+  for (const std::string& remark : columns->remarks) builder.remark(remark);
+  if (drawing.flat && columns->scales == 3) builder.remark("2D Gaussians, drawn as discs");
+  // A file with an unfused 3D filter comes straight from its trainer, which has the 2D one too.
+  if (drawing.antialiased.value_or(columns->filter != kNone)) builder.set_antialiased();
+  if (drawing.up) builder.set_up(*drawing.up);
+  return std::move(builder).finish();
 }
 
 }  // namespace figurine::ports

@@ -185,7 +185,7 @@ FIG_DEFAULT(camera)
 typedef struct fig_orbit {
   size_t struct_bytes;
   float azimuth_deg;   /* 0 sees the front of a figure that faces +z; positive goes to its left */
-  float elevation_deg; /* positive goes up; within [-89, 89] */
+  float elevation_deg; /* positive goes up; within [-90, 90] */
   float distance_m;    /* from the target */
   float vertical_fov_deg; /* 1 to 170 */
   float target_m[3];

@@ -93,14 +93,13 @@ Result<std::vector<Point>> sample_points(std::span<const uint32_t> frames,
 }
 
 // The camera that the options name, at the size asked for.
-Result<Camera> fixed_camera(const CameraPathOptions& options, const Camera& golden) {
+Result<Camera> camera_of_file(const CameraPathOptions& options, const Camera& golden) {
   if (options.framing != Framing::kBody) {
     return Status(StatusCode::kInvalidArgument,
                   "framing: a camera from a file frames by itself; give one or the other");
   }
-  ImageSize size{options.camera.fixed->width_px, options.camera.fixed->height_px};
-  if (size.width_px == 0) size = {golden.width_px, golden.height_px};
-  Result<Camera> sized = resize_camera(*options.camera.fixed, options.size.value_or(size));
+  Result<Camera> sized =
+      fixed_camera(*options.camera.fixed, options.size, {golden.width_px, golden.height_px});
   if (!sized.ok()) return sized;
   if (options.near_m) sized->near_m = *options.near_m;
   FIG_RETURN_IF_ERROR(validate_camera(*sized));
@@ -118,7 +117,7 @@ Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
       return Status(StatusCode::kInvalidArgument,
                     "turntable: a camera from a file stays where it is; give one or the other");
     }
-    const Result<Camera> camera = fixed_camera(options, golden);
+    const Result<Camera> camera = camera_of_file(options, golden);
     if (!camera.ok()) return camera.status();
     return std::vector<Camera>(frames.size(), *camera);
   }

@@ -1,5 +1,5 @@
-// --camera: "orbit:AZ,EL,DIST[,FOV]" (degrees, metres, vertical field of view) or the name of a
-// JSON file (docs/json.md, "Camera").
+// --camera: "orbit:AZ,EL,DIST[,FOV]" (degrees, metres, vertical field of view), or "FILE[#N]", a
+// camera of a JSON file (camera_file.h).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -8,25 +8,21 @@
 
 #include "figurine/camera.h"
 #include "figurine/status.h"
-#include "samples/common/parse.h"
+#include "samples/common/camera_file.h"
 
 namespace figurine::samples {
 
 // Neither: the tool frames what it draws. The orbit's target is the tool's business, too.
 struct CameraSpec {
   std::optional<OrbitCamera> orbit;
-  std::optional<Camera> fixed;  // width_px = height_px = 0 if the file has no size
+  std::optional<FileCamera> fixed;
 };
 
-// Reads and checks the file, if it is one. Errors name the option or the file and the field.
+// Reads and checks the file, if it is one: FILE#N is the file of that very name, if there is one.
+// Errors name the option or the file and the field.
 Result<CameraSpec> parse_camera_spec(const std::string& text);
-Result<Camera> parse_camera_json(const std::string& json, const std::string& name);
 
-// What parse_camera_json reads, value for value.
+// As figurine's own files have it, value for value.
 nlohmann::ordered_json camera_json(const Camera& camera);
-
-// The fixed camera at the size asked for: same picture, other resolution. kInvalidArgument if the
-// shapes of the two images differ.
-Result<Camera> resize_camera(const Camera& camera, ImageSize size);
 
 }  // namespace figurine::samples

@@ -210,6 +210,9 @@ Status run_render(const RenderOptions& options) {
   if (sheet) FIG_RETURN_IF_ERROR(sheet->write(options.contact_sheet, opaque));
   const double wall_s = static_cast<double>(ports::now_ns() - start_ns) * 1e-9;
 
+  const std::optional<FileCamera>& camera = job->camera_path.camera.fixed;
+  if (camera && !camera->said.empty())
+    std::fprintf(stderr, "figurine: %s: %s\n", options.camera.c_str(), camera->said.c_str());
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("render");
     json["avatars"] = options.scene.avatars;

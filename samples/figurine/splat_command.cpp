@@ -1,4 +1,4 @@
-// figurine splat: any standard file of 3D Gaussians, into one image.
+// figurine splat: any file of 3D Gaussians, into one image.
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -18,33 +18,27 @@ namespace figurine::samples {
 
 namespace {
 
+constexpr const char* kUpOfTheFile = "auto";
+
 struct SplatCommandOptions {
-  std::string scene, camera, size, background, up = "+y", output;
+  std::string scene, camera, size, background, up = kUpOfTheFile, output;
   std::optional<float> near_m;
   float alpha_cut = kAlphaCut;
-  bool antialiased = false;
+  std::optional<bool> antialiased;  // none: as the file says
   DeviceOptions device;
 };
 
-Result<Camera> choose_camera(const SplatCommandOptions& options, const GaussianCloud& cloud) {
+Result<Camera> choose_camera(const SplatCommandOptions& options, const CameraSpec& spec,
+                             const GaussianCloud& cloud) {
   std::optional<ImageSize> size;
   if (!options.size.empty()) {
     const Result<ImageSize> parsed = parse_size(options.size);
     if (!parsed.ok()) return parsed.status();
     size = *parsed;
   }
-  CameraSpec spec;
-  if (!options.camera.empty()) {
-    Result<CameraSpec> parsed = parse_camera_spec(options.camera);
-    if (!parsed.ok()) return parsed.status();
-    spec = *parsed;
-  }
   Result<Camera> camera = Status(StatusCode::kInvalidArgument, "camera");
   if (spec.fixed) {
-    const bool has_size = spec.fixed->width_px != 0;
-    camera = resize_camera(
-        *spec.fixed, size.value_or(has_size ? ImageSize{spec.fixed->width_px, spec.fixed->height_px}
-                                            : kSceneSize));
+    camera = fixed_camera(*spec.fixed, size, kSceneSize, cloud.origin_m);
   } else {
     const ImageSize wanted = size.value_or(kSceneSize);
     camera = scene_camera(orbit_scene(cloud, spec.orbit, options.up, wanted), options.up, wanted);
@@ -55,7 +49,17 @@ Result<Camera> choose_camera(const SplatCommandOptions& options, const GaussianC
   return camera;
 }
 
-Status run_splat(const SplatCommandOptions& options) {
+// What was read and taken for granted, a line each for file and camera.
+void say(const SplatCommandOptions& options, const GaussianCloud& cloud, const CameraSpec& spec,
+         uint64_t visible) {
+  std::fprintf(stderr, "figurine: %s: %s\n", options.scene.c_str(), ports::describe(cloud).c_str());
+  if (spec.fixed && !spec.fixed->said.empty())
+    std::fprintf(stderr, "figurine: %s: %s\n", options.camera.c_str(), spec.fixed->said.c_str());
+  if (visible == 0)
+    std::fprintf(stderr, "figurine: %s: no Gaussian is in the picture\n", options.scene.c_str());
+}
+
+Status run_splat(SplatCommandOptions options) {
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
   Result<Background> background =
@@ -68,9 +72,18 @@ Status run_splat(const SplatCommandOptions& options) {
                   options.output + ": a scene does not move; write .png, .jpg or .pfm");
   }
 
-  const Result<GaussianCloud> cloud = read_scene(options.scene);
+  CameraSpec spec;
+  if (!options.camera.empty()) {
+    Result<CameraSpec> parsed = parse_camera_spec(options.camera);
+    if (!parsed.ok()) return parsed.status();
+    spec = std::move(*parsed);
+  }
+  Result<GaussianCloud> cloud = read_scene(options.scene);
   if (!cloud.ok()) return cloud.status();
-  const Result<Camera> camera = choose_camera(options, *cloud);
+  if (options.up != kUpOfTheFile) cloud->up = ports::parse_up_axis(options.up);
+  options.up = to_string(cloud->up_axis());
+  cloud->antialiased = options.antialiased.value_or(cloud->antialiased);
+  const Result<Camera> camera = choose_camera(options, spec, *cloud);
   if (!camera.ok()) return camera.status();
   const ImageSize size{camera->width_px, camera->height_px};
   Result<std::unique_ptr<FileSink>> sink = FileSink::create(
@@ -87,17 +100,13 @@ Status run_splat(const SplatCommandOptions& options) {
       {.camera = *camera,
        .gaussians = gaussians,
        .background = background->colour,
-       .splat = {.alpha_cut = options.alpha_cut, .antialiased = options.antialiased}},
+       .splat = {.alpha_cut = options.alpha_cut, .antialiased = cloud->antialiased}},
       frame.target()));
   log.add((*renderer)->statistics(), ports::now_ns() - start_ns);
   FIG_RETURN_IF_ERROR((*sink)->add(frame, 0));
   FIG_RETURN_IF_ERROR((*sink)->finish());
 
-  if (cloud->left_out > 0) {
-    std::fprintf(stderr,
-                 "figurine: %s: left out %llu Gaussians that are not finite or have no rotation\n",
-                 options.scene.c_str(), static_cast<unsigned long long>(cloud->left_out));
-  }
+  say(options, *cloud, spec, (*renderer)->statistics().visible);
   if (options.device.json) {
     nlohmann::ordered_json json = json_header("splat");
     json["scene"] = options.scene;
@@ -105,7 +114,11 @@ Status run_splat(const SplatCommandOptions& options) {
     json["gaussians"] = cloud->count();
     json["left_out"] = cloud->left_out;
     json["sh_degree"] = cloud->sh_degree;
-    json["antialiased"] = options.antialiased;
+    json["container"] = cloud->container;
+    json["antialiased"] = cloud->antialiased;
+    json["up"] = options.up;
+    json["origin"] = cloud->origin_m;
+    json["remarks"] = cloud->remarks;
     json["size"] = {size.width_px, size.height_px};
     json["camera"] = camera_json(*camera);
     json["stages_ms"] = log.stages_json();
@@ -118,32 +131,42 @@ Status run_splat(const SplatCommandOptions& options) {
   return {};
 }
 
+std::vector<std::string> up_choices() {
+  std::vector<std::string> choices = kUpAxes;
+  choices.insert(choices.begin(), kUpOfTheFile);
+  return choices;
+}
+
 }  // namespace
 
 Command add_splat_command(CLI::App& app) {
   auto options = std::make_shared<SplatCommandOptions>();
-  CLI::App* command = app.add_subcommand("splat", "Renders a .ply file of 3D Gaussians");
+  CLI::App* command = app.add_subcommand("splat", "Renders a file of 3D Gaussians");
   command
-      ->add_option("scene", options->scene, "Gaussians in the layout of the original 3DGS (.ply)")
+      ->add_option("scene", options->scene,
+                   "Gaussians: .ply of 3DGS and its kin, compressed .ply, .splat, .spz")
       ->required();
   command->add_option("--camera", options->camera,
-                      "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the scene");
+                      "orbit:AZ,EL,DIST[,FOV], a JSON file, cameras.json#N of 3DGS or "
+                      "transforms.json#N of a NeRF; default: the whole scene from the front");
   command
       ->add_option("--up", options->up,
-                   "which axis of the file points up, for orbits: +y, -y, +z or -z")
-      ->check(CLI::IsMember(kUpAxes))
+                   "which axis of the file points up, for orbits: +y, -y, +z, -z, +x or -x; auto: "
+                   "as the file says, or -y")
+      ->check(CLI::IsMember(up_choices()))
       ->capture_default_str();
   command
       ->add_option("--near", options->near_m,
-                   "metres; Gaussians nearer than this are culled; default 0.2")
+                   "metres; Gaussians nearer than this are culled; default 0.2, of a camera near "
+                   "the scene a tenth of its distance")
       ->check(CLI::PositiveNumber);
   command
       ->add_option("--alpha-cut", options->alpha_cut,
                    "contributions below it are skipped; default 1/255")
       ->check(CLI::Range(1e-9f, 0.5f));
-  command->add_flag("--antialiased", options->antialiased,
+  command->add_flag("--antialiased,!--no-antialiased", options->antialiased,
                     "for scenes that were trained with Mip-Splatting's 2D filter (gsplat: "
-                    "rasterize_mode antialiased, eps2d 0.1); files do not say so");
+                    "rasterize_mode antialiased, eps2d 0.1); default: as the file's comments say");
   command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the camera's, or 1024x768");
   command->add_option("--background", options->background,
                       "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha");

@@ -1,5 +1,5 @@
 // figurine-inspect: what a package is, what a device needs for it, where it came from; on the
-// reader alone.
+// reader alone. Of a file of Gaussians, what is read of it.
 //
 // Exit 0 if every package named is sound, 1 if one is not (the reason on stderr, one line), 2 on
 // wrong usage.
@@ -8,6 +8,7 @@
 #include <exception>
 #include <string>
 
+#include "ports/gaussians/gaussian_file.h"
 #include "ports/host/files.h"
 #include "samples/inspect/describe.h"
 #include "samples/inspect/print.h"
@@ -18,6 +19,7 @@ using figurine::Package;
 using figurine::Result;
 using figurine::Status;
 using figurine::inspect::Json;
+using figurine::ports::GaussianCloud;
 using figurine::ports::MappedFile;
 
 struct Options {
@@ -47,7 +49,37 @@ void print(const Json& document) {
   print(document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
+Status inspect_gaussians(const Options& options) {
+  if (options.tensors || !options.other_path.empty()) {
+    return Status(figurine::StatusCode::kInvalidArgument,
+                  options.path + ": --tensors and --diff are for packages");
+  }
+  const Result<MappedFile> file = MappedFile::open(options.path);
+  if (!file.ok()) return file.status();
+  const Result<GaussianCloud> cloud = figurine::ports::read_gaussians(file->bytes(), options.path);
+  if (!cloud.ok()) return cloud.status();
+  if (options.json) {
+    print(Json{{"file", options.path},
+               {"kind", "gaussians"},
+               {"container", cloud->container},
+               {"size_bytes", file->bytes().size()},
+               {"gaussians", cloud->count()},
+               {"sh_degree", cloud->sh_degree},
+               {"left_out", cloud->left_out},
+               {"left_out_why", cloud->left_out_why},
+               {"origin", cloud->origin_m},
+               {"up", to_string(cloud->up_axis())},
+               {"up_stated", cloud->up.has_value()},
+               {"antialiased", cloud->antialiased},
+               {"remarks", cloud->remarks}});
+  } else {
+    print(options.path + ": " + figurine::ports::describe(*cloud) + "\n");
+  }
+  return {};
+}
+
 Status inspect(const Options& options) {
+  if (figurine::ports::is_gaussian_name(options.path)) return inspect_gaussians(options);
   const Result<OpenedFile> opened = open_file(options.path);
   if (!opened.ok()) return opened.status();
   const std::span<const std::byte> bytes = opened->file.bytes();
@@ -82,10 +114,13 @@ Status inspect(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "figurine-inspect: prints what a .fgn package is, what it needs and where it came from"};
+      "figurine-inspect: prints what a .fgn package is, what it needs and where it came from; of a "
+      "file of Gaussians, what is read of it"};
   app.set_version_flag("--version", "figurine-inspect " FIGURINE_VERSION);
   Options options;
-  app.add_option("package", options.path, "the package")->required()->type_name("PKG");
+  app.add_option("package", options.path, "the package, or .ply, .splat, .spz")
+      ->required()
+      ->type_name("PKG");
   app.add_flag("--json", options.json, "print JSON (documented in docs/package.md)");
   CLI::Option* tensors = app.add_flag(
       "--tensors", options.tensors,

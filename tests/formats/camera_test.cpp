@@ -38,7 +38,7 @@ TEST(OrbitCamera, IsOrthonormalRightHandedAndSeesItsTargetAtTheCentre) {
   LargestError orthonormality("R R^T - I"), centre("target at the image centre [px]"),
       depth("distance, relative");
   for (float azimuth : {-540.0f, -180.0f, -90.0f, -1.0f, 0.0f, 30.0f, 90.0f, 179.0f, 1000.0f}) {
-    for (float elevation : {-89.0f, -45.0f, 0.0f, 10.0f, 89.0f}) {
+    for (float elevation : {-90.0f, -89.0f, -45.0f, 0.0f, 10.0f, 90.0f}) {
       for (float distance : {0.1f, 3.0f, 100.0f}) {
         const Camera camera = orbit({.azimuth_deg = azimuth,
                                      .elevation_deg = elevation,
@@ -103,7 +103,7 @@ TEST(OrbitCamera, WholeTurnsAndQuarterTurnsAreExact) {
 TEST(OrbitCamera, RejectsValuesOutsideItsRanges) {
   for (const OrbitCamera& bad :
        {OrbitCamera{.azimuth_deg = kNan}, OrbitCamera{.azimuth_deg = kInfinity},
-        OrbitCamera{.elevation_deg = 90}, OrbitCamera{.elevation_deg = kNan},
+        OrbitCamera{.elevation_deg = 91}, OrbitCamera{.elevation_deg = kNan},
         OrbitCamera{.distance_m = 0}, OrbitCamera{.distance_m = -1},
         OrbitCamera{.distance_m = kInfinity}, OrbitCamera{.vertical_fov_deg = 0.5f},
         OrbitCamera{.vertical_fov_deg = 171}, OrbitCamera{.vertical_fov_deg = kNan},

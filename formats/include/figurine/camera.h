@@ -26,14 +26,15 @@ Status validate_camera(const Camera& camera);
 struct OrbitCamera {
   float azimuth_deg = 0;    // 0 looks at the front of a figure that faces +z; positive moves the
                             // camera to the figure's left (+x)
-  float elevation_deg = 0;  // positive moves the camera up; within [-89, 89]
+  float elevation_deg = 0;  // positive moves the camera up; within [-90, 90]
   float distance_m = 3;
   float vertical_fov_deg = 40;  // 1 to 170
   std::array<float, 3> target_m{0, 0, 0};
 };
 
-// A camera on a sphere around the target, looking at it, y up. Errors: kInvalidArgument on anything
-// outside the ranges above.
+// A camera on a sphere around the target, looking at it, y up; straight from above, what lies away
+// from an orbit of the same azimuth is on top. Errors: kInvalidArgument on anything outside the
+// ranges above.
 Result<Camera> make_orbit_camera(const OrbitCamera& orbit, uint32_t width_px, uint32_t height_px);
 
 }  // namespace figurine

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -273,6 +274,27 @@ TEST(Inspect, DiffNamesEveryDifferenceAndNoOther) {
   EXPECT_EQ(kinds.exit_code, 0);
   EXPECT_TRUE(contains(kinds.out, "/kind: \"avatar\" -> \"motion\"")) << kinds.out;
   EXPECT_TRUE(contains(kinds.out, "motion.rotations: only in b")) << kinds.out;
+}
+
+TEST(Inspect, SaysWhatIsReadOfFilesOfGaussians) {
+  const Outcome line = inspect("../../data/gaussians/scene.compressed.ply");
+  EXPECT_EQ(line.exit_code, 0) << line.err;
+  EXPECT_EQ(
+      line.out,
+      "../../data/gaussians/scene.compressed.ply: 260 Gaussians of degree 3 (compressed ply), "
+      "up -y (assumed)\n");
+  const Outcome json = inspect("--json ../../data/gaussians/scene.splat");
+  EXPECT_EQ(json.exit_code, 0) << json.err;
+  for (const char* field : {"\"kind\": \"gaussians\"", "\"gaussians\": 260", "\"up\": \"-y\"",
+                            "\"up_stated\": false", "\"left_out\": 0"})
+    EXPECT_NE(json.out.find(field), std::string::npos) << field << json.out;
+  for (const char* arguments : {"--tensors ../../data/gaussians/scene.splat",
+                                "../../data/cases/ply-truncated/in.ply", "none.spz"}) {
+    const Outcome refused = inspect(arguments);
+    EXPECT_EQ(refused.exit_code, 1) << arguments;
+    EXPECT_EQ(refused.out, "");
+    EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+  }
 }
 
 }  // namespace
