@@ -11,7 +11,7 @@ of them on the first two CPUs that this process may use, once by themselves and 
 process that does nothing but count. Latency is from a datagram's arrival until the frame's last
 byte was taken. The shipped motions go through motion -> VMC -> pose for the error in degrees, and
 Clang's libFuzzer, which this script builds with the address sanitizer, runs the OSC parser from the
-seeds in tests/fuzz/osc.
+seeds in tests/fuzz/seeds/osc.
 
 With --vivid the frames and errors of a virtual video device are rows too: GUEST is vivid_guest of
 the preset aarch64, the kernel that of `scripts/setup vivid` (tests/ports/v4l2/vivid_test.py).
@@ -35,7 +35,7 @@ import results
 PERSON, BODY = "samples/packages/person.fgn", "samples/packages/body-128.fgn"
 WALK, DANCE = "samples/packages/walk.fgn", "samples/packages/dance.fgn"
 SIZE, THREADS = "512x512", 2
-SEEDS = "tests/fuzz/osc"
+SEEDS = "tests/fuzz/seeds/osc"
 FUZZED = ("tests/fuzz/osc_fuzz.cpp", "ports/vmc/osc.cpp", "ports/vmc/vmc_state.cpp",
           "ports/vmc/humanoid.cpp", "formats/src/pose.cpp", "formats/src/status.cpp",
           "formats/src/check.cpp")

@@ -1,5 +1,5 @@
 // Any bytes as a datagram: refused, or read without a step beyond their end; and what a sender says
-// with them leaves a pose that a body can take. tests/fuzz/osc is the seed corpus.
+// with them leaves a pose that a body can take. tests/fuzz/seeds/osc is the seed corpus.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
