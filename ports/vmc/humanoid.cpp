@@ -100,7 +100,6 @@ constexpr std::string_view kNeeded[] = {
     "RightLowerLeg", "RightFoot",     "LeftUpperArm", "LeftLowerArm", "LeftHand",
     "RightUpperArm", "RightLowerArm", "RightHand",    "Head"};
 
-constexpr double kFarthest_m = 1000;
 constexpr double kLeastScale = 0.05, kMostScale = 20;
 
 bool same_name(std::string_view a, std::string_view b) {
@@ -233,7 +232,7 @@ void HumanoidRig::to_body(const HumanoidPose& pose, std::span<float> rotations,
       leg_m_ / (glm::length(pose.offset_m[knee]) + glm::length(pose.offset_m[foot]));
   if (!(scale >= kLeastScale && scale <= kMostScale)) return;
   const Vec3 place = scale * (pose.root_m + pose.root * pose.offset_m[0]) - rest_[0];
-  if (!(glm::length(place) <= kFarthest_m)) return;
+  if (!(glm::length(place) <= kFarthestPlace_m)) return;
   for (int k = 0; k < 3; ++k)
     root_translation_m[static_cast<size_t>(k)] = static_cast<float>(place[k]);
 }

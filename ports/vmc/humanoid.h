@@ -36,6 +36,8 @@
 namespace figurine::ports {
 
 inline constexpr size_t kHumanoidBones = 55;
+// A place from outside that is further from the origin is not believed.
+inline constexpr double kFarthestPlace_m = 1000;
 
 // Its number, by Unity's name ("LeftUpperArm") whatever its case; none for other names.
 std::optional<size_t> humanoid_bone(std::string_view name);

@@ -9,7 +9,6 @@ namespace figurine::ports {
 
 namespace {
 
-constexpr double kFarthest_m = 1000;
 constexpr double kShortest = 1e-6;  // quaternions
 constexpr size_t kLongestName = 64;
 
@@ -77,7 +76,8 @@ void VmcState::take_transform(OscMessage message, bool root, uint64_t now_ns) {
   const glm::dquat turned(v[6], v[3], v[4], v[5]);
   const double length = std::sqrt(glm::dot(turned, turned));
   // Written so that NaN fails.
-  if (!(glm::length(place) <= kFarthest_m) || !(length >= kShortest && length <= 1 / kShortest)) {
+  if (!(glm::length(place) <= kFarthestPlace_m) ||
+      !(length >= kShortest && length <= 1 / kShortest)) {
     ++counts_.dropped;
     return;
   }
