@@ -3,16 +3,19 @@
 // has a fresh pose and a run of the network, or a fresh camera.
 //
 // Precisions and thread counts take turns frame by frame, so that whatever else the machine does
-// falls on all of them alike; medians are compared, not means.
+// falls on all of them alike; medians are compared, not means. With --hz there is one of them, and
+// its frames begin at ticks of a steady clock: what is counted then is deadlines missed.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "ports/host/clock.h"
 #include "ports/host/files.h"
+#include "samples/common/deadlines.h"
 #include "samples/common/device_options.h"
 #include "samples/common/machine.h"
 #include "samples/common/progress.h"
@@ -29,6 +32,7 @@ struct BenchOptions {
   BenchSubject subject;
   DeviceOptions device;
   std::string size, json, camera, framing = "body";
+  double hz = 0;  // 0: as fast as it goes
 };
 
 // What is asked for; otherwise all that every avatar holds, the renderer's own choice first; that
@@ -38,6 +42,7 @@ Result<std::vector<std::optional<Precision>>> choose_precisions(const BenchOptio
   if (!options.subject.ply.empty()) return Precisions{std::nullopt};
   if (const std::optional<Precision> asked = options.device.network_precision())
     return Precisions{asked};
+  if (options.hz > 0) return Precisions{std::nullopt};
   const Result<Scene> scene = Scene::load(options.subject.scene);
   if (!scene.ok()) return scene.status();
   Precisions precisions;
@@ -93,6 +98,20 @@ void print_table(const nlohmann::ordered_json& json) {
   for (const auto& lane : lanes)
     std::printf("%20llu", static_cast<unsigned long long>(lane["missed_60hz"].get<uint64_t>()));
   std::printf("\n");
+  if (json.contains("paced")) {
+    const auto& paced = json["paced"];
+    std::printf("\npaced at %g Hz: %llu of %llu frames missed their deadline, %llu ticks dropped\n",
+                paced["hz"].get<double>(),
+                static_cast<unsigned long long>(paced["missed"].get<uint64_t>()),
+                static_cast<unsigned long long>(paced["frames"].get<uint64_t>()),
+                static_cast<unsigned long long>(paced["dropped"].get<uint64_t>()));
+    for (const auto& [key, meaning] : {std::pair("latency_ms", "from tick to picture"),
+                                       std::pair("wait_ms", "of it, until the frame began")}) {
+      std::printf("%-29s p50 %.3f, p99 %.3f, worst %.3f ms\n", meaning,
+                  paced[key]["p50"].get<double>(), paced[key]["p99"].get<double>(),
+                  paced[key]["worst"].get<double>());
+    }
+  }
   const auto& work = lanes[0]["work"];
   std::printf("\nwork a frame: %.3f GMAC, %llu Gaussians, %llu visible, %llu pairs, %llu blends\n",
               work["macs"].get<double>() * 1e-9,
@@ -170,6 +189,33 @@ nlohmann::ordered_json describe(const BenchSubject& subject, const std::vector<B
   return json;
 }
 
+// Every lane's frame i, by turns.
+Status run_by_turns(std::vector<BenchLane>& lanes, uint32_t frames, RenderedFrame& frame) {
+  Progress progress("bench", frames);
+  for (uint32_t i = 0; i < frames; ++i) {
+    FIG_RETURN_IF_ERROR(check_interrupt());
+    for (size_t turn = 0; turn < lanes.size(); ++turn)
+      FIG_RETURN_IF_ERROR(lanes[(i + turn) % lanes.size()].render(i, frame, true));
+    progress.update(i + 1);
+  }
+  return {};
+}
+
+// A frame at every tick that is not dropped. Progress is drawn between a frame's end and the next
+// tick, on the time that is left over.
+Status run_paced(BenchLane& lane, uint32_t frames, RenderedFrame& frame, Deadlines& deadlines) {
+  Progress progress("bench", frames);
+  for (uint32_t i = 0; i < frames; ++i) {
+    FIG_RETURN_IF_ERROR(check_interrupt());
+    ports::sleep_until(deadlines.tick_ns());
+    const uint64_t began_ns = ports::now_ns();
+    FIG_RETURN_IF_ERROR(lane.render(i, frame, true));
+    deadlines.add(began_ns, ports::now_ns());
+    progress.update(i + 1);
+  }
+  return {};
+}
+
 Status run_bench(BenchOptions options) {
   const Result<RendererOptions> renderer_options = options.device.renderer_options();
   if (!renderer_options.ok()) return renderer_options.status();
@@ -184,7 +230,8 @@ Status run_bench(BenchOptions options) {
   uint64_t peak_bytes = 0;
   std::unique_ptr<RenderedFrame> frame;
   for (const std::optional<Precision> precision : *precisions) {
-    for (const uint32_t threads : std::set<uint32_t>{1, renderer_options->threads}) {
+    const uint32_t all = renderer_options->threads;
+    for (const uint32_t threads : std::set<uint32_t>{options.hz > 0 ? all : 1, all}) {
       RendererOptions own = *renderer_options;
       own.threads = threads;
       FirstFrame again;
@@ -200,12 +247,13 @@ Status run_bench(BenchOptions options) {
     }
   }
 
-  Progress progress("bench", subject->frames);
-  for (uint32_t i = 0; i < subject->frames; ++i) {
-    FIG_RETURN_IF_ERROR(check_interrupt());
-    for (size_t turn = 0; turn < lanes.size(); ++turn)
-      FIG_RETURN_IF_ERROR(lanes[(i + turn) % lanes.size()].render(i, *frame, true));
-    progress.update(i + 1);
+  nlohmann::ordered_json paced;
+  if (options.hz > 0) {
+    Deadlines deadlines(options.hz, ports::now_ns());
+    FIG_RETURN_IF_ERROR(run_paced(lanes[0], subject->frames, *frame, deadlines));
+    paced = deadlines.json();
+  } else {
+    FIG_RETURN_IF_ERROR(run_by_turns(lanes, subject->frames, *frame));
   }
 
   nlohmann::ordered_json runs = nlohmann::ordered_json::array();
@@ -221,6 +269,7 @@ Status run_bench(BenchOptions options) {
                             {"prepare", first.prepare_ms},
                             {"render", first.render_ms}};
   json["peak_memory_bytes"] = peak_bytes;
+  if (!paced.is_null()) json["paced"] = std::move(paced);
   json["runs"] = std::move(runs);
   if (options.json == "-") {
     print_json(json);
@@ -255,6 +304,11 @@ Command add_bench_command(CLI::App& app) {
   command->add_option("--frames", subject.frames, "measured frames")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();
+  command
+      ->add_option("--hz", options->hz,
+                   "begin frames at ticks of this rate and count those that end after the next "
+                   "tick; one precision, one number of threads; default: as fast as it goes")
+      ->check(CLI::Range(1.0, 1000.0));
   command->add_option("--size", options->size,
                       "WIDTHxHEIGHT; default: the golden frame's, or 1024x768");
   add_crowd_options(*command, subject.scene);

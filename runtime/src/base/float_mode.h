@@ -1,7 +1,6 @@
 // How a thread's floats round, trap and treat denormals: what a frame and a sampler run in,
 // whatever their caller has, and what he gets back. Denormals cost some CPUs a hundred cycles an
-// operation; a frame takes them for zero, as inputs and as results (docs/numerics.md, "Same
-// pixels").
+// operation; a frame takes them for zero, inputs and results (docs/numerics.md, "Same pixels").
 //
 // On other architectures nothing is set.
 #pragma once
