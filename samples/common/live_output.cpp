@@ -19,24 +19,24 @@ namespace figurine::samples {
 
 namespace {
 
-constexpr uint64_t kLook_ns = 20'000'000;  // how often a FIFO is asked for its reader
+constexpr uint64_t kAsk_ns = 20'000'000;  // how often a FIFO is asked for its reader
 
-enum class Kind { kStandardOutput, kVideoDevice, kFile, kStream };
+enum class Target { kStandardOutput, kVideoDevice, kFile, kStream };
 
-Result<Kind> kind_of(const std::string& name) {
+Result<Target> target_of(const std::string& name) {
   const auto unsupported = [&](const std::string& why) {
     return Status(StatusCode::kUnsupported, name + ": " + why);
   };
-  if (name == "-") return Kind::kStandardOutput;
+  if (name == "-") return Target::kStandardOutput;
   if (name == "window") return unsupported("there is no window in this build");
-  if (name.starts_with("/dev/video")) return Kind::kVideoDevice;
+  if (name.starts_with("/dev/video")) return Target::kVideoDevice;
   struct stat there{};
   const bool exists = ::stat(name.c_str(), &there) == 0;
-  if (exists && (S_ISFIFO(there.st_mode) || S_ISCHR(there.st_mode))) return Kind::kStream;
+  if (exists && (S_ISFIFO(there.st_mode) || S_ISCHR(there.st_mode))) return Target::kStream;
   if (exists && !S_ISREG(there.st_mode)) return unsupported("neither a file, a FIFO nor a device");
   if (!name.ends_with(".y4m"))
     return unsupported("live video goes to - (standard output), /dev/videoN, a FIFO or x.y4m");
-  return Kind::kFile;
+  return Target::kFile;
 }
 
 // A FIFO without a reader refuses to be opened without waiting; one that waits could not be
@@ -50,19 +50,19 @@ Result<int> open_stream(const std::string& name) {
       return Status(StatusCode::kIo, name + ": cannot be written: " + std::strerror(errno));
     if (!std::exchange(said, true)) say(name + ": waiting for a reader");
     FIG_RETURN_IF_ERROR(check_interrupt());
-    ports::sleep_until(ports::now_ns() + kLook_ns);
+    ports::sleep_until(ports::now_ns() + kAsk_ns);
   }
 }
 
 }  // namespace
 
-Status LiveOutput::check(const std::string& name) { return kind_of(name).status(); }
+Status LiveOutput::check(const std::string& name) { return target_of(name).status(); }
 
 Result<LiveOutput> LiveOutput::open(const std::string& name, const Options& options) {
-  const Result<Kind> kind = kind_of(name);
-  if (!kind.ok()) return kind.status();
+  const Result<Target> target = target_of(name);
+  if (!target.ok()) return target.status();
   LiveOutput output;
-  if (*kind == Kind::kVideoDevice) {
+  if (*target == Target::kVideoDevice) {
     Result<std::unique_ptr<V4l2Sink>> device =
         V4l2Sink::open(name, options.size, {.frames_per_second = options.frames_per_second});
     if (!device.ok()) return device.status();
@@ -71,13 +71,13 @@ Result<LiveOutput> LiveOutput::open(const std::string& name, const Options& opti
   }
   int descriptor = STDOUT_FILENO;
   std::string shown = "standard output";
-  if (*kind == Kind::kStandardOutput) {
+  if (*target == Target::kStandardOutput) {
     if (::isatty(STDOUT_FILENO) == 1) {
       return Status(StatusCode::kUnsupported,
                     "standard output: is a terminal; pipe it into what shows y4m, as in "
                     "figurine live ... -o - | ffplay -");
     }
-  } else if (*kind == Kind::kFile) {
+  } else if (*target == Target::kFile) {
     Result<ports::AtomicFile> file = ports::AtomicFile::create(name);
     if (!file.ok()) return file.status();
     output.file_.emplace(std::move(file).value());

@@ -20,7 +20,7 @@ constexpr const char* kJoints = "joints";
 constexpr double kShortestQuaternion = 1e-6;  // as validate_pose has it
 constexpr size_t kLongestShownName = 64;
 
-Status invalid(const std::string& where, const std::string& what) {
+Status refused(const std::string& where, const std::string& what) {
   return Status(StatusCode::kInvalidArgument, where + ": " + what);
 }
 
@@ -56,23 +56,23 @@ Result<Json> parse_json(std::string_view text, const std::string& where) {
   };
   try {
     Json json = Json::parse(text, note);
-    if (!twice.empty()) return invalid(where, shown(twice) + ": is there twice");
-    if (!json.is_object()) return invalid(where, "pose: not a JSON object");
+    if (!twice.empty()) return refused(where, shown(twice) + ": is there twice");
+    if (!json.is_object()) return refused(where, "pose: not a JSON object");
     return json;
   } catch (const Json::exception& error) {
-    return invalid(where, "pose: " + reason_of(error));
+    return refused(where, "pose: " + reason_of(error));
   }
 }
 
 // A list of numbers that fit into floats; where names the field.
 Result<std::vector<double>> read_numbers(const Json& json, const std::string& where) {
-  if (!json.is_array()) return invalid(where, "not a list of numbers");
+  if (!json.is_array()) return refused(where, "not a list of numbers");
   std::vector<double> values;
   for (const Json& entry : json) {
-    if (!entry.is_number()) return invalid(where, "not a list of numbers");
+    if (!entry.is_number()) return refused(where, "not a list of numbers");
     values.push_back(entry.get<double>());
     if (!std::isfinite(static_cast<float>(values.back())))
-      return invalid(where, "a value is beyond what a float holds");
+      return refused(where, "a value is beyond what a float holds");
   }
   return values;
 }
@@ -81,10 +81,10 @@ Status read_root(const Json& json, const std::string& where, std::array<float, 3
   const Result<std::vector<double>> values = read_numbers(json, where);
   if (!values.ok()) return values.status();
   if (values->size() != 3)
-    return invalid(where, "has " + std::to_string(values->size()) + " numbers, not 3");
+    return refused(where, "has " + std::to_string(values->size()) + " numbers, not 3");
   for (size_t k = 0; k < 3; ++k) {
     if (std::abs((*values)[k]) > kFarthestRoot_m)
-      return invalid(where, "a value is beyond 10000 metres");
+      return refused(where, "a value is beyond 10000 metres");
     out[k] = static_cast<float>((*values)[k]);
   }
   return {};
@@ -96,17 +96,17 @@ Status read_rotation(const Json& json, const std::string& where, float* wxyz) {
   const std::vector<double>& v = *values;
   if (v.size() == 4) {
     if (std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + v[3] * v[3]) < kShortestQuaternion)
-      return invalid(where, "a quaternion of no length turns nothing");
+      return refused(where, "a quaternion of no length turns nothing");
     for (size_t k = 0; k < 4; ++k) wxyz[k] = static_cast<float>(v[k]);
     return {};
   }
   if (v.size() != 3) {
-    return invalid(where, "has " + std::to_string(v.size()) +
+    return refused(where, "has " + std::to_string(v.size()) +
                               " numbers, neither 4 (quaternion wxyz) nor 3 (axis times angle)");
   }
   const glm::dvec3 axis(v[0], v[1], v[2]);
   const double angle = glm::length(axis);
-  if (angle > 1e6) return invalid(where, "an angle is beyond a million radians");
+  if (angle > 1e6) return refused(where, "an angle is beyond a million radians");
   const glm::quat q = angle > 0 ? rotation_about(axis / angle, angle) : glm::quat(1, 0, 0, 0);
   store_quaternion(q, wxyz);
   return {};
@@ -119,7 +119,7 @@ Status unknown(const std::string& where, const std::string& what, const std::str
   const std::vector<std::string> nearest = nearest_names(name, names);
   for (size_t i = 0; i < nearest.size(); ++i)
     message += (i == 0 ? "; nearest: " : ", ") + nearest[i];
-  return invalid(where, message);
+  return refused(where, message);
 }
 
 void append_number(float value, std::string& text) {
@@ -157,7 +157,7 @@ Result<StoredPose> parse_pose_json(std::string_view text, std::span<const std::s
       const std::string fields[] = {kRoot, kJoints};
       return unknown(where, "field", field, fields);
     } else if (!value.is_object()) {
-      return invalid(where, std::string(kJoints) + ": not an object of names and rotations");
+      return refused(where, std::string(kJoints) + ": not an object of names and rotations");
     }
   }
   if (!json->contains(kJoints)) return pose;
@@ -180,7 +180,7 @@ Result<StoredPose> load_pose_json(const std::string& path,
       "\x8F"
       "FGN";
   if (text.starts_with(kPackage)) {
-    return invalid(path,
+    return refused(path,
                    "pose: is a package, not JSON; a motion is played by --motion, and "
                    "figurine pose writes one frame of it as JSON");
   }

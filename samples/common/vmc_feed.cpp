@@ -6,7 +6,7 @@ namespace figurine::samples {
 
 namespace {
 
-constexpr int kLook_ms = 100;  // how soon the thread sees that it shall end
+constexpr int kListen_ms = 100;  // how soon the thread sees that it shall end
 constexpr uint64_t kGather_ns = 500'000'000;
 
 std::string joined(const std::vector<std::string>& names) {
@@ -69,7 +69,8 @@ void VmcFeed::run() {
     channels.clear();
   };
   while (!stop_) {
-    const Result<std::optional<std::span<const std::byte>>> datagram = receiver_.receive(kLook_ms);
+    const Result<std::optional<std::span<const std::byte>>> datagram =
+        receiver_.receive(kListen_ms);
     const uint64_t now_ns = options_.now_ns();
     if (!datagram.ok()) {
       const std::lock_guard lock(mutex_);
