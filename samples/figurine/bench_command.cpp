@@ -31,7 +31,7 @@ constexpr uint32_t kWarmUpFrames = 3;
 struct BenchOptions {
   BenchSubject subject;
   DeviceOptions device;
-  std::string size, json, camera, framing = "body";
+  std::string size, json, camera, framing = "body", roofline;
   double hz = 0;  // 0: as fast as it goes
 };
 
@@ -110,6 +110,22 @@ void print_table(const nlohmann::ordered_json& json) {
       std::printf("%-29s p50 %.3f, p99 %.3f, worst %.3f ms\n", meaning,
                   paced[key]["p50"].get<double>(), paced[key]["p99"].get<double>(),
                   paced[key]["worst"].get<double>());
+    }
+  }
+  if (lanes[0].contains("roofline")) {
+    std::printf("\nshare of this machine's peak:\n");
+    for (const auto& [stage, first] : lanes[0]["roofline"].items()) {
+      std::printf("%-12s", stage.c_str());
+      for (const auto& lane : lanes) {
+        const auto& shares = lane["roofline"];
+        if (!shares.contains(stage)) {
+          std::printf("%20s", "-");
+          continue;
+        }
+        std::printf("%19.1f%%", 100 * shares[stage]["share"].template get<double>());
+      }
+      std::printf("  of %s\n",
+                  stage == "network" ? "MACs" : first["of"].get<std::string>().c_str());
     }
   }
   const auto& work = lanes[0]["work"];
@@ -222,6 +238,12 @@ Status run_bench(BenchOptions options) {
   const Result<BenchSubject> subject = subject_of(options);
   if (!subject.ok()) return subject.status();
   options.subject = *subject;
+  std::optional<Roofline> roofline;
+  if (!options.roofline.empty()) {
+    Result<Roofline> loaded = Roofline::load(options.roofline);
+    if (!loaded.ok()) return loaded.status();
+    roofline = std::move(*loaded);
+  }
   const auto precisions = choose_precisions(options);
   if (!precisions.ok()) return precisions.status();
 
@@ -257,7 +279,13 @@ Status run_bench(BenchOptions options) {
   }
 
   nlohmann::ordered_json runs = nlohmann::ordered_json::array();
-  for (const BenchLane& lane : lanes) runs.push_back(lane.json());
+  for (const BenchLane& lane : lanes) {
+    runs.push_back(lane.json());
+    if (!roofline) continue;
+    const auto shares = roofline->shares(runs.back(), to_string(lane.isa()), lane.scene_size());
+    if (!shares.ok()) return shares.status();
+    runs.back()["roofline"] = *shares;
+  }
   nlohmann::ordered_json json = json_header("bench");
   json["date"] = ports::date_utc();
   json["machine"] = json_machine(
@@ -309,6 +337,9 @@ Command add_bench_command(CLI::App& app) {
                    "begin frames at ticks of this rate and count those that end after the next "
                    "tick; one precision, one number of threads; default: as fast as it goes")
       ->check(CLI::Range(1.0, 1000.0));
+  command->add_option("--roofline", options->roofline,
+                      "what this machine can do at most, by tests/bench/roofline: prints every "
+                      "stage's share of it");
   command->add_option("--size", options->size,
                       "WIDTHxHEIGHT; default: the golden frame's, or 1024x768");
   add_crowd_options(*command, subject.scene);

@@ -23,7 +23,9 @@ double ms_since(uint64_t start_ns) {
 Status BenchLane::open_figures(const BenchSubject& subject, const RendererOptions& options,
                                FirstFrame& first) {
   uint64_t start_ns = ports::now_ns();
-  Result<Scene> scene = Scene::load(subject.scene);
+  SceneOptions wanted = subject.scene;
+  wanted.open = OpenOptions::for_drawing(precision_.value_or(Precision::kFixedPoint));
+  Result<Scene> scene = Scene::load(wanted);
   if (!scene.ok()) return scene.status();
   scene_ = std::make_unique<Scene>(std::move(*scene));
   first.open_ms = ms_since(start_ns);
@@ -118,6 +120,15 @@ Status BenchLane::render(uint32_t i, RenderedFrame& frame, bool measured) {
     log_.add(renderer_->statistics(), total_ns);
   }
   return status;
+}
+
+SceneSize BenchLane::scene_size() const {
+  const uint64_t pixels = uint64_t{size().width_px} * size().height_px;
+  if (scene_) return size_of(*scene_, pixels);
+  const GaussianView view = cloud_->view();
+  return {.gaussian_bytes = view.position_m.size_bytes() + view.covariance_factor.size_bytes() +
+                            view.opacity.size_bytes() + view.sh.size_bytes(),
+          .pixels = pixels};
 }
 
 nlohmann::ordered_json BenchLane::json() const {

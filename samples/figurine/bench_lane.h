@@ -15,6 +15,7 @@
 #include "samples/common/rendered_frame.h"
 #include "samples/common/scene.h"
 #include "samples/figurine/gaussian_scene.h"
+#include "samples/figurine/roofline.h"
 
 namespace figurine::samples {
 
@@ -44,6 +45,8 @@ class BenchLane {
   const Scene* figures() const { return scene_.get(); }  // null of Gaussians
   const Approximation& approximation() const { return approximation_; }
   Status render(uint32_t i, RenderedFrame& frame, bool measured);
+  SceneSize scene_size() const;
+  Isa isa() const { return renderer_->isa(); }
   // An entry of "runs" (docs/json.md).
   nlohmann::ordered_json json() const;
 

@@ -63,6 +63,27 @@ TEST_F(Bench, FramesThatCannotBeInTimeAreMissedAndNeverQueued) {
   EXPECT_LT(json["paced"]["wait_ms"]["p50"], json["paced"]["latency_ms"]["p50"]);
 }
 
+TEST_F(Bench, SharesOfARooflineStandBesideTheStages) {
+  folder_.write("peak.json", R"({"command": "roofline", "rows": [{"threads": 1,
+      "int8_macs_per_s": 1e12, "f32_macs_per_s": 1e11,
+      "blend_operations_per_s": {"baseline": 1e10, "sse41": 1e10, "avx2": 2e10, "avx512": 4e10,
+                                 "neon": 1e10},
+      "memory_bytes_per_s": {"copy": 1e10}}]})");
+  const Json json = paced("--size 64x64 --frames 3 --threads 1 --roofline peak.json");
+  const Json& shares = json["runs"][0]["roofline"];
+  for (const char* stage : {"network", "blend", "resolve"}) {
+    ASSERT_TRUE(shares.contains(stage)) << stage;
+    EXPECT_GT(shares[stage]["share"], 0.0);
+  }
+  const ProgramRun text =
+      run("bench avatar.fgn --size 64x64 --frames 3 --threads 1 --roofline peak.json");
+  EXPECT_NE(text.out.find("share of this machine's peak"), std::string::npos) << text.out;
+  const ProgramRun none = run("bench avatar.fgn --frames 3 --roofline none.json --json b.json");
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_NE(none.err.find("none.json"), std::string::npos) << none.err;
+  EXPECT_FALSE(folder_.has("b.json"));
+}
+
 TEST_F(Bench, SaysItInWordsAndRefusesARateThatIsNone) {
   const ProgramRun text = run("bench avatar.fgn --size 32x32 --hz 500 --frames 3 --threads 1");
   EXPECT_EQ(text.exit_code, 0) << text.err;
