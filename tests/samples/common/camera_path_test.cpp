@@ -77,7 +77,7 @@ TEST_F(CameraPath, AnOrbitIsAboutWhatIsFramed) {
 
 TEST_F(CameraPath, ACameraThatIsFixedFramesByItself) {
   CameraPathOptions options{.framing = Framing::kBust};
-  options.camera.fixed = cameras({.size = ImageSize{64, 64}}).front();
+  options.camera.fixed = FileCamera{.width_px = 64, .height_px = 64};
   EXPECT_EQ(make_camera_path(options, frames_, *scene_, *renderer_).status().code(),
             StatusCode::kInvalidArgument);
 }
