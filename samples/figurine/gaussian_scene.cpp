@@ -72,8 +72,13 @@ void keep_the_scene(std::vector<Extent>& extents) {
     return std::hypot(d.x, d.y, d.z);
   };
   for (size_t i = 0; i < values.size(); ++i) values[i] = distance(extents[i]);
-  const float mass = quantile(values, kMassShare);
-  if (!(mass > 0)) return;  // one place
+  float mass = quantile(values, kMassShare);
+  for (size_t i = 0; i < values.size(); ++i) {
+    const glm::vec3& half = extents[i].half;
+    values[i] = std::max({half.x, half.y, half.z});
+  }
+  mass = std::max(mass, quantile(values, kMassShare));  // a scene may be in one place
+  if (!(mass > 0)) return;
   std::erase_if(extents,
                 [&](const Extent& extent) { return !(distance(extent) <= kReach * mass); });
   for (Extent& extent : extents) extent.half = glm::min(extent.half, glm::vec3(mass));

@@ -93,6 +93,20 @@ TEST_F(SplatFiles, WhatChangesNothingGivesTheReference) {
   }
 }
 
+// Nine tenths of it within no distance at all: what is far is told by the Gaussians' own size.
+TEST_F(SplatFiles, ASceneInOnePlaceIsNotLostToItsStrays) {
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 20\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n"
+      "property float opacity\nproperty float scale_0\nend_header\n";
+  for (int i = 0; i < 19; ++i) text += "1 2 3 1 0 0 4 -3\n";
+  folder_.write("place.ply", text + "1e30 2 3 1 0 0 4 -3\n");
+  const ImageF32 image = picture("place.ply");
+  EXPECT_TRUE(said("one scale, the same along all axes")) << said_;
+  EXPECT_GT(pixel(image, 80, 60)[3], 0.9f);
+  EXPECT_EQ(pixel(image, 2, 2)[3], 0.0f);
+}
+
 TEST_F(SplatFiles, SayWhatWasTakenForGranted) {
   picture_of_case("ply-zero-quat");
   EXPECT_TRUE(said("441 without a rotation (quaternion 0), left unrotated")) << said_;
