@@ -97,12 +97,8 @@ void LineFeed::take_lines(std::string& rest, bool at_end) {
 void LineFeed::take_line(std::string_view line) {
   if (line.find_first_not_of(" \t\r") == std::string_view::npos) return;
   const uint64_t now_ns = options_.now_ns();
-  uint64_t number = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    number = ++lines_;
-  }
-  const std::string where = options_.name + ": line " + std::to_string(number);
+  // Counted with its pose, below, so that who sees a line counted can see what it said.
+  const std::string where = options_.name + ": line " + std::to_string(lines_ + 1);
   Status wrong;
   std::vector<StoredPose> poses;
   if (line.size() > kLongestLine)
@@ -118,6 +114,7 @@ void LineFeed::take_line(std::string_view line) {
   uint64_t malformed = 0;
   {
     const std::lock_guard lock(mutex_);
+    ++lines_;
     if (wrong.ok()) {
       for (size_t s = 0; s < poses.size(); ++s) skeletons_[s]->newest = std::move(poses[s]);
       newest_ns_ = now_ns;

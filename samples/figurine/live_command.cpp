@@ -182,7 +182,9 @@ Status run_live_command(LiveOptions options) {
   if (!plan.ok()) return plan.status();
   if (options.pose != "-" && !plan->address)
     FIG_RETURN_IF_ERROR(add_pose_file(options.pose, options.scene));
-  Result<Scene> scene = Scene::load(options.scene);
+  SceneOptions wanted = options.scene;
+  wanted.open = options.device.open_options();
+  Result<Scene> scene = Scene::load(wanted);
   if (!scene.ok()) return scene.status();
   const Result<std::unique_ptr<PoseFeed>> opened = open_feed(options, *plan);
   if (!opened.ok()) return opened.status();
