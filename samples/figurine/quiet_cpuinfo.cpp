@@ -5,5 +5,7 @@
 // program's.
 #include <cstdarg>
 
-extern "C" void cpuinfo_vlog_error(const char* format, va_list arguments);
+// The linker sees no reason to export what is hidden by default.
+extern "C" [[gnu::visibility("default")]] void cpuinfo_vlog_error(const char* format,
+                                                                  va_list arguments);
 extern "C" void cpuinfo_vlog_error(const char*, va_list) {}
