@@ -28,9 +28,9 @@ def arm_instructions(layers):
     cores = json.loads(ARM.read_text())["cores"]
     names = [layer["name"] for layer in layers]
     return {
-        core: [layer["instructions"] for layer in found["layers"]]
+        core: [layer.get("instructions", 0) for layer in found["layers"]]
         for core, found in cores.items()
-        if [layer["layer"] for layer in found["layers"]] == names
+        if [layer["layer"] for layer in found.get("layers", [])] == names
     }
 
 

@@ -78,9 +78,8 @@ Result<std::vector<LayerCost>> last_run(const Network& network) {
       // With what XNNPACK does besides its operators, a few hundred instructions.
       cost.count = run.stage_end - run.begin - in_operators;
     } else {
-      // A concatenation is two copies.
-      const size_t operators = layer.op == LayerOp::kConcat ? 2 : 1;
-      for (size_t k = 0; k < operators && next < counts.size(); ++k) cost.count += counts[next++];
+      cost.count = next < counts.size() ? counts[next] : 0;
+      ++next;
       in_operators += cost.count;
     }
   }
