@@ -74,9 +74,9 @@ def bench(framing, options):
 
 def total(with_it, without_it):
     """The least of rounds of a frame's median time with an omission and without: a virtual machine
-    may run at one of two speeds, and a round at the slower says nothing. Where a network runs at one
-    of N frames medians say little of a mixture: of the time without, the runs that were left out
-    are taken off."""
+    may run at one of two speeds, and a round at the slower says nothing. Where a network runs at
+    one of N frames medians say little of a mixture: of the time without, the runs that were left
+    out are taken off."""
     more = min(ms["total"] for ms, _ in without_it)
     less = min(ms["total"] for ms, _ in with_it)
     share = with_it[0][1]
