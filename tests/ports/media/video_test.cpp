@@ -14,36 +14,10 @@
 
 #include "ports/host/atomic_file.h"
 #include "ports/media/y4m.h"
+#include "tests/ports/media/temporary_folder.h"
 
 namespace figurine::ports::video_test {
 namespace {
-
-class Folder {
- public:
-  Folder() {
-    std::string pattern =
-        (std::filesystem::temp_directory_path() / "figurine-video-XXXXXX").string();
-    FIG_CHECK(::mkdtemp(pattern.data()) != nullptr, "no temporary folder");
-    path_ = pattern;
-  }
-  ~Folder() {
-    std::error_code error;
-    std::filesystem::remove_all(path_, error);
-  }
-  std::string path(const std::string& name) const { return (path_ / name).string(); }
-  size_t files() const {
-    return static_cast<size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
-  }
-  std::string read(const std::string& name) const {
-    std::ifstream file(path(name), std::ios::binary);
-    std::ostringstream content;
-    content << file.rdbuf();
-    return content.str();
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 ImageU8 plain(uint32_t width, uint32_t height, uint8_t r, uint8_t g, uint8_t b) {
   ImageU8 image(width, height, 3);
@@ -116,7 +90,7 @@ TEST(FrameRate, FractionsAreExact) {
 }
 
 TEST(VideoWriter, Y4mAppearsWholeOrNotAtAll) {
-  const Folder folder;
+  const TemporaryFolder folder;
   {
     auto writer =
         VideoWriter::create(folder.path("x.y4m"), {.width_px = 4, .height_px = 4, .rate = {}});
@@ -140,8 +114,10 @@ bool has_ffmpeg() {
 }
 
 TEST(VideoWriter, Mp4KeepsColoursAndSizesThroughFfmpeg) {
-  if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg with libx264 on this machine";
-  const Folder folder;
+  if (!has_ffmpeg())
+    GTEST_SKIP()
+        << "needs ffmpeg with libx264, which scripts/setup toolchain installs: runs in dev";
+  const TemporaryFolder folder;
   auto writer =
       VideoWriter::create(folder.path("x.mp4"), {.width_px = 64, .height_px = 48, .rate = {25, 1}});
   ASSERT_TRUE(writer.ok()) << writer.status().message();
@@ -160,8 +136,9 @@ TEST(VideoWriter, Mp4KeepsColoursAndSizesThroughFfmpeg) {
 }
 
 TEST(VideoWriter, WebmAndGifGoThroughFfmpegWithTheirAlpha) {
-  if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg on this machine";
-  const Folder folder;
+  if (!has_ffmpeg())
+    GTEST_SKIP() << "needs ffmpeg, which scripts/setup toolchain installs: runs in dev";
+  const TemporaryFolder folder;
   ImageU8 frame(64, 48, 4);  // a red half that is there, and one that is not
   for (uint32_t y = 0; y < 48; ++y) {
     for (uint32_t x = 0; x < 64; ++x) {
@@ -196,8 +173,9 @@ TEST(VideoWriter, WebmAndGifGoThroughFfmpegWithTheirAlpha) {
 }
 
 TEST(VideoWriter, Y4mColoursAreWhatFfmpegSees) {
-  if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg on this machine";
-  const Folder folder;
+  if (!has_ffmpeg())
+    GTEST_SKIP() << "needs ffmpeg, which scripts/setup toolchain installs: runs in dev";
+  const TemporaryFolder folder;
   auto writer =
       VideoWriter::create(folder.path("x.y4m"), {.width_px = 16, .height_px = 16, .rate = {}});
   ASSERT_TRUE((*writer)->add(plain(16, 16, 30, 180, 220)).ok());
@@ -214,8 +192,9 @@ TEST(VideoWriter, Y4mColoursAreWhatFfmpegSees) {
 }
 
 TEST(VideoWriter, AnAbandonedMp4LeavesNothing) {
-  if (!has_ffmpeg()) GTEST_SKIP() << "no ffmpeg on this machine";
-  const Folder folder;
+  if (!has_ffmpeg())
+    GTEST_SKIP() << "needs ffmpeg, which scripts/setup toolchain installs: runs in dev";
+  const TemporaryFolder folder;
   {
     auto writer =
         VideoWriter::create(folder.path("x.mp4"), {.width_px = 64, .height_px = 48, .rate = {}});
@@ -226,7 +205,7 @@ TEST(VideoWriter, AnAbandonedMp4LeavesNothing) {
 }
 
 TEST(VideoWriter, OtherNamesAreUnsupported) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto writer =
       VideoWriter::create(folder.path("x.avi"), {.width_px = 4, .height_px = 4, .rate = {}});
   ASSERT_FALSE(writer.ok());
@@ -234,7 +213,7 @@ TEST(VideoWriter, OtherNamesAreUnsupported) {
 }
 
 TEST(AtomicFile, IsInvisibleUntilCommitted) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string text = "content";
   {
     Result<AtomicFile> file = AtomicFile::create(folder.path("x"));
@@ -250,7 +229,7 @@ TEST(AtomicFile, IsInvisibleUntilCommitted) {
 }
 
 TEST(AtomicFile, SaysWhyItCannotBeWritten) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const Result<AtomicFile> missing = AtomicFile::create(folder.path("no/such/x"));
   ASSERT_FALSE(missing.ok());
   EXPECT_NE(missing.status().message().find("no/such/x"), std::string::npos);

@@ -9,30 +9,10 @@
 
 #include "ports/host/files.h"
 #include "ports/media/video.h"
+#include "tests/ports/media/temporary_folder.h"
 
 namespace figurine::ports::webp_test {
 namespace {
-
-class Folder {
- public:
-  Folder() {
-    std::string pattern =
-        (std::filesystem::temp_directory_path() / "figurine-webp-XXXXXX").string();
-    FIG_CHECK(::mkdtemp(pattern.data()) != nullptr, "no temporary folder");
-    path_ = pattern;
-  }
-  ~Folder() {
-    std::error_code error;
-    std::filesystem::remove_all(path_, error);
-  }
-  std::string path(const std::string& name) const { return (path_ / name).string(); }
-  size_t files() const {
-    return static_cast<size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 // A disc of alpha 255 with a soft edge on nothing, shaded, at a place that moves with i; without
 // alpha a darker disc (chroma, at half the resolution, has no edge to keep). Nothing changes by a
@@ -84,7 +64,7 @@ Decoded decode(const std::string& path) {
 TEST(Webp, KeepsPicturesAlphaAndTimes) {
   constexpr int kFrames = 7;
   for (const uint32_t channels : {3u, 4u}) {
-    const Folder folder;
+    const TemporaryFolder folder;
     auto writer = VideoWriter::create(
         folder.path("x.WebP"),
         {.width_px = 61, .height_px = 47, .rate = {30000, 1001}, .alpha = channels == 4});
@@ -117,7 +97,7 @@ TEST(Webp, KeepsPicturesAlphaAndTimes) {
 }
 
 TEST(Webp, OneFrameIsAPicture) {
-  const Folder folder;
+  const TemporaryFolder folder;
   auto writer = VideoWriter::create(folder.path("x.webp"),
                                     {.width_px = 61, .height_px = 47, .rate = {}, .alpha = true});
   ASSERT_TRUE((*writer)->add(disc(61, 47, 0, 4)).ok());
@@ -126,7 +106,7 @@ TEST(Webp, OneFrameIsAPicture) {
 }
 
 TEST(Webp, WhatCannotBeIsRefusedAndLeavesNothing) {
-  const Folder folder;
+  const TemporaryFolder folder;
   EXPECT_EQ(VideoWriter::create(folder.path("x.webp"), {.width_px = 16384, .height_px = 2})
                 .status()
                 .code(),
