@@ -32,7 +32,8 @@ struct AvatarArguments {
   std::string body, run;
   bool all = false, resume = false, quiet = false;
   std::optional<std::string> preset, init, template_mode, fourier, precision, background, optimiser,
-      standoff, network, static_grids, static_colour, smallest_extent, antialiased, perceptual;
+      standoff, network, static_grids, static_colour, smallest_extent, antialiased, perceptual,
+      adapter, basis;
   std::optional<uint64_t> seed, iterations;
   std::optional<double> minutes, learning_rate, weight_decay, static_learning_rate, static_penalty,
       clip_gradient;
@@ -79,7 +80,12 @@ void overlay_parts(const AvatarArguments& arguments, train::TrainSettings& setti
   if (arguments.smallest_extent) settings.smallest_extent = *arguments.smallest_extent == "on";
   if (arguments.antialiased) settings.antialiased = *arguments.antialiased == "on";
   if (arguments.freeze_network || arguments.network_rank) settings.freeze_network = true;
-  if (arguments.network_rank) settings.network_rank = *arguments.network_rank;
+  if (arguments.network_rank) settings.adapter.rank = *arguments.network_rank;
+  if (arguments.adapter)
+    settings.adapter.kind = choose(
+        *arguments.adapter,
+        {model::AdapterKind::kResidual, model::AdapterKind::kScale, model::AdapterKind::kBasis});
+  if (arguments.basis) settings.adapter.basis = *arguments.basis;
 }
 
 void overlay_perceptual(const AvatarArguments& arguments, train::PerceptualSettings& settings) {
@@ -274,11 +280,23 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--freeze-network", arguments.freeze_network,
                     "The network of --init stays: only the static values learn");
+  CLI::Option* rank =
+      command
+          ->add_option("--network-rank", arguments.network_rank,
+                       "The network of --init stays, but for an adapter of this rank on its "
+                       "kernels, which learns beside the static values; packages hold the result")
+          ->check(CLI::Range(1, 256));
+  CLI::Option* adapter =
+      command
+          ->add_option("--network-adapter", arguments.adapter,
+                       "residual: A B is added to a kernel (default); scale: the kernel is "
+                       "multiplied by 1 + A B; basis: A alone is learned, B is --network-basis'")
+          ->check(CLI::IsMember({"residual", "scale", "basis"}))
+          ->needs(rank);
   command
-      ->add_option("--network-rank", arguments.network_rank,
-                   "The network of --init stays, but for a residual of this rank on its kernels, "
-                   "which learns beside the static values; packages hold the sum")
-      ->check(CLI::Range(1, 256));
+      ->add_option("--network-basis", arguments.basis,
+                   "Directions that many people share (figurine-train basis)")
+      ->needs(adapter);
   command
       ->add_option("--clip-gradient", arguments.clip_gradient,
                    "Largest norm of an iteration's gradients; run.json says the last (default 0: "

@@ -12,6 +12,7 @@ void add_body_command(CLI::App& app);
 void add_motion_command(CLI::App& app);
 void add_capture_command(CLI::App& app);
 void add_avatar_command(CLI::App& app);
+void add_basis_command(CLI::App& app);
 void add_pack_command(CLI::App& app);
 void add_population_command(CLI::App& app);
 void add_sampler_command(CLI::App& app);

@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   figurine::cli::add_motion_command(app);
   figurine::cli::add_capture_command(app);
   figurine::cli::add_avatar_command(app);
+  figurine::cli::add_basis_command(app);
   figurine::cli::add_pack_command(app);
   figurine::cli::add_population_command(app);
   figurine::cli::add_sampler_command(app);

@@ -46,8 +46,8 @@ train::TrainSettings fine_tune_settings(const train::TrainSettings& of_run,
       0;                         // the run's own, rounded: a package has one for both precisions
   settings.standoff_weight = 0;  // what stands off has been found
   settings.perceptual = {};      // rounding is to be undone, not detail to be found
-  settings.freeze_network = false, settings.network_rank = 0;  // rounding the network is what
-                                                               // this is about
+  settings.freeze_network = false, settings.adapter = {};  // rounding the network is what this is
+                                                           // about
   settings.bf16 = false;
   settings.threads = options.threads;
   return settings;

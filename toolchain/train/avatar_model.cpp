@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "toolchain/error.h"
-#include "toolchain/model/low_rank.h"
+#include "toolchain/model/network_adapter.h"
 #include "toolchain/tensor_operations.h"
 
 namespace figurine::train {
@@ -171,10 +171,10 @@ nlohmann::json describe_parts(const AvatarModel& model) {
                {"macs", count_macs(layers, value_or_throw(infer_shapes(layers, false), "network"))},
                {"bytes_f32", 4 * parameters},
                {"bytes_q8", parameters - outputs + 8 * outputs}};
-    if (settings.network_rank > 0) {
-      const model::LowRankResidual residual(model.unet(), settings.network_rank, 0);
-      network["residual"] = {{"rank", settings.network_rank},
-                             {"values", residual.factors().numel()}};
+    if (const uint32_t rank = settings.adapter.rank; rank > 0) {
+      network["adapter"] = {{"kind", to_string(settings.adapter.kind)},
+                            {"rank", rank},
+                            {"values", factor_count(model.unet(), settings.adapter.kind, rank)}};
     }
   }
   if (!model.statics().empty()) {

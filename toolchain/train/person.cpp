@@ -34,6 +34,19 @@ model::OptimiserOptions adamw_options(const TrainSettings& settings, double weig
           .weight_decay = weight_decay};
 }
 
+torch::Tensor FrozenOutputs::get(size_t frame, const std::function<torch::Tensor()>& compute) {
+  constexpr size_t kMostBytes = size_t{1} << 29;
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = outputs_.find(frame); found != outputs_.end()) return found->second;
+  }
+  torch::Tensor output = compute();
+  const std::lock_guard lock(mutex_);
+  if (bytes_ + output.nbytes() <= kMostBytes && outputs_.emplace(frame, output).second)
+    bytes_ += output.nbytes();
+  return output;
+}
+
 Person::Person(const Body& body, const dataset::Dataset& data, const TrainSettings& settings,
                RunDirectory run_directory, nlohmann::json run_json)
     : run(std::move(run_directory)),

@@ -2,8 +2,11 @@
 // pictures change, which is the static part. The network may be everybody's.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <unordered_map>
 #include <vector>
 
 #include "toolchain/model/optimiser.h"
@@ -18,6 +21,18 @@ namespace figurine::train {
 unsigned lane_count(const TrainSettings& settings);
 
 model::OptimiserOptions adamw_options(const TrainSettings& settings, double weight_decay);
+
+// A network that stays says the same of a pose every time: what it said, kept by the pose's frame,
+// up to half a gigabyte. May be called from several threads.
+class FrozenOutputs {
+ public:
+  torch::Tensor get(size_t frame, const std::function<torch::Tensor()>& compute);
+
+ private:
+  std::mutex mutex_;
+  std::unordered_map<size_t, torch::Tensor> outputs_;
+  size_t bytes_ = 0;
+};
 
 class Person {
  public:
@@ -41,6 +56,7 @@ class Person {
   nlohmann::json description;  // its run.json
   model::Optimiser static_optimiser;
   torch::Tensor reference;  // of the warm-up; undefined without one
+  FrozenOutputs outputs;    // of a network that nothing learns of
 
  private:
   const dataset::Dataset& data_;

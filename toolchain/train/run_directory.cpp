@@ -14,7 +14,7 @@
 
 #include "ports/host/files.h"
 #include "toolchain/error.h"
-#include "toolchain/model/low_rank.h"
+#include "toolchain/model/network_adapter.h"
 #include "toolchain/model/optimiser.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/tensor_operations.h"
@@ -174,15 +174,23 @@ void take_optimiser(const std::string& path, const TensorFile& file, const std::
   optimiser.steps = static_cast<int64_t>(parse_double(path, file.metadata, prefix + "_steps"));
 }
 
-void add_residual(const model::LowRankResidual& residual, TensorFile& file) {
-  file.tensors["residual.base"] = flat_tensor(residual.base());
-  file.tensors["residual.factors"] = flat_tensor(residual.factors());
+void add_adapter(const model::NetworkAdapter& adapter, TensorFile& file) {
+  file.tensors["adapter.base"] = flat_tensor(adapter.base());
+  file.tensors["adapter.factors"] = flat_tensor(adapter.factors());
+  if (adapter.kind() == model::AdapterKind::kBasis)
+    file.tensors["adapter.basis"] = flat_tensor(adapter.basis());
 }
 
-void take_residual(const std::string& path, const TensorFile& file,
-                   model::LowRankResidual& residual) {
-  take_flat_tensor(file, path, "residual.base", residual.base());
-  take_flat_tensor(file, path, "residual.factors", residual.factors());
+void take_adapter(const std::string& path, const TensorFile& file, model::NetworkAdapter& adapter) {
+  torch::Tensor base = torch::empty_like(adapter.base());
+  take_flat_tensor(file, path, "adapter.base", base);
+  adapter.set_base(base);
+  take_flat_tensor(file, path, "adapter.factors", adapter.factors());
+  if (adapter.kind() != model::AdapterKind::kBasis) return;
+  torch::Tensor basis = torch::empty_like(adapter.basis());
+  take_flat_tensor(file, path, "adapter.basis", basis);
+  if (!torch::equal(basis, adapter.basis()))
+    throw InputError(path + ": adapter.basis: network_basis is another file than it was");
 }
 
 std::string person_prefix(size_t further) { return "person." + std::to_string(further + 1) + "."; }
@@ -237,7 +245,7 @@ void save_checkpoint(const RunDirectory& run, const TrainingState& state, const 
   add_parts(parts, file);
   if (optimisers.unet != nullptr) add_optimiser("optimiser", *optimisers.unet, file);
   if (optimisers.statics != nullptr) add_optimiser("static_optimiser", *optimisers.statics, file);
-  if (parts.residual != nullptr) add_residual(*parts.residual, file);
+  if (parts.adapter != nullptr) add_adapter(*parts.adapter, file);
   for (size_t p = 0; p < further.size(); ++p) {
     add_statics(*further[p].statics, file, person_prefix(p));
     add_optimiser(person_prefix(p) + "static_optimiser", *further[p].optimiser, file);
@@ -268,7 +276,7 @@ TrainingState load_checkpoint(const RunDirectory& run, const LearnedParts& parts
   if (optimisers.unet != nullptr) take_optimiser(path, file, "optimiser", *optimisers.unet);
   if (optimisers.statics != nullptr)
     take_optimiser(path, file, "static_optimiser", *optimisers.statics);
-  if (parts.residual != nullptr) take_residual(path, file, *parts.residual);
+  if (parts.adapter != nullptr) take_adapter(path, file, *parts.adapter);
   for (size_t p = 0; p < further.size(); ++p) {
     take_statics(path, file, *further[p].statics, person_prefix(p));
     take_optimiser(path, file, person_prefix(p) + "static_optimiser", *further[p].optimiser);

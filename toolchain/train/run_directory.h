@@ -8,8 +8,9 @@
 //                            static.G [M,channels], a static part's values group by group; and
 //                            smallest_extent.scale_m [1], .code [N], if the run has such
 //   checkpoint.safetensors   the same and what --resume needs: the optimisers' moments, iteration,
-//                            seconds; a residual's base and factors; under person.N. the static
-//                            values of the people beyond the first, where several share a network
+//                            seconds; an adapter's base, factors and basis; under person.N. the
+//                            static values of the people beyond the first, where several share a
+//                            network
 //   evaluation.json          by figurine-train evaluate reconstruction
 //
 // Every file appears whole or not at all.
@@ -23,7 +24,7 @@
 #include "toolchain/train/tensor_file.h"
 
 namespace figurine::model {
-class LowRankResidual;
+class NetworkAdapter;
 class Optimiser;
 class PoseUNet;
 }  // namespace figurine::model
@@ -77,11 +78,11 @@ struct LearnedParts {
   model::PoseUNet* unet = nullptr;
   StaticMap* statics = nullptr;
   SmallestExtentMap* extents = nullptr;
-  model::LowRankResidual* residual = nullptr;  // folded into the network; of checkpoints alone
+  model::NetworkAdapter* adapter = nullptr;  // folded into the network; of checkpoints alone
 };
 // And what changes it.
 struct PartOptimisers {
-  model::Optimiser* unet = nullptr;  // of the network or of its residual
+  model::Optimiser* unet = nullptr;  // of the network or of its adapter
   model::Optimiser* statics = nullptr;
 };
 // Of people beyond the first who share the network.

@@ -24,6 +24,8 @@ constexpr std::array kBackgrounds{TrainingBackground::kBlack, TrainingBackground
 constexpr std::array kOptimisers{OptimiserKind::kAdamW, OptimiserKind::kMuon};
 constexpr std::array kTemplateModes{TemplateMode::kMean, TemplateMode::kShaped};
 constexpr std::array kStaticColours{model::StaticColour::kGain, model::StaticColour::kSum};
+constexpr std::array kAdapters{model::AdapterKind::kResidual, model::AdapterKind::kScale,
+                               model::AdapterKind::kBasis};
 
 struct ChannelRange {
   const char* name;
@@ -178,9 +180,14 @@ void check_parts(const TrainSettings& settings, const std::string& where) {
             "freeze_network: there must be a network, and static_grids to learn");
     require(!settings.init.empty(), where, "freeze_network: needs the network of an init");
   }
-  require(settings.network_rank == 0 || settings.freeze_network, where,
+  const AdapterSettings& adapter = settings.adapter;
+  require(adapter.rank == 0 || settings.freeze_network, where,
           "network_rank: goes with freeze_network");
-  require(settings.network_rank <= kMaxNetworkRank, where, "network_rank: more than 256");
+  require(adapter.rank <= kMaxNetworkRank, where, "network_rank: more than 256");
+  require(adapter.rank > 0 || adapter.kind == model::AdapterKind::kResidual, where,
+          "network_adapter: needs a network_rank");
+  require((adapter.kind == model::AdapterKind::kBasis) == !adapter.basis.empty(), where,
+          "network_basis: goes with network_adapter basis, and that needs one");
   require(settings.perceptual.weight >= 0 && std::isfinite(settings.perceptual.weight), where,
           "perceptual.weight: must be finite and not negative");
   for (const double value :
@@ -267,7 +274,10 @@ void add_parts(const TrainSettings& s, nlohmann::json& json) {
   if (s.smallest_extent) json["smallest_extent"] = true;
   if (s.antialiased) json["antialiased"] = true;
   if (s.freeze_network) json["freeze_network"] = true;
-  if (s.network_rank > 0) json["network_rank"] = s.network_rank;
+  if (s.adapter.rank > 0) json["network_rank"] = s.adapter.rank;
+  if (s.adapter.kind != model::AdapterKind::kResidual)
+    json["network_adapter"] = to_string(s.adapter.kind);
+  if (!s.adapter.basis.empty()) json["network_basis"] = s.adapter.basis;
   if (s.static_grids.empty()) return;
   json["static_grids"] = to_string(s.static_grids);
   json["static_colour"] = to_string(s.static_colour);
@@ -286,7 +296,10 @@ void read_parts(const nlohmann::json& json, const std::string& where, TrainSetti
   s.channels = json.value("channels", 0u);
   s.clip_gradient = json.value("clip_gradient", 0.0);
   s.freeze_network = json.value("freeze_network", false);
-  s.network_rank = json.value("network_rank", 0u);
+  s.adapter.rank = json.value("network_rank", 0u);
+  s.adapter.kind = parse(json.value("network_adapter", std::string("residual")), kAdapters,
+                         where + ": network_adapter");
+  s.adapter.basis = json.value("network_basis", std::string());
   s.static_grids = parse_static_grids(json.value("static_grids", std::string("none")), where);
   s.static_colour = parse(json.value("static_colour", std::string("gain")), kStaticColours,
                           where + ": static_colour");

@@ -10,6 +10,7 @@
 
 #include "figurine/avatar.h"
 #include "toolchain/model/compose.h"
+#include "toolchain/model/network_adapter.h"
 #include "toolchain/train/schedule.h"
 
 namespace figurine::train {
@@ -59,6 +60,13 @@ struct PerceptualSettings {
                              // every picture; 0: all that the rest of the loss sees
 };
 
+// What a person may change of a network that stays (toolchain/model/network_adapter.h).
+struct AdapterSettings {
+  model::AdapterKind kind = model::AdapterKind::kResidual;
+  uint32_t rank = 0;  // 0: nothing
+  std::string basis;  // of kBasis: file (kernel_basis_file.h)
+};
+
 struct TrainSettings {
   std::string preset = "edge";
   uint32_t uv_size = 0;       // T; 0: the preset's
@@ -75,8 +83,7 @@ struct TrainSettings {
                       // (kInitialWeightsSeed, or --init)
   std::string init;   // weights or run to start from; empty: the common initial weights
   bool freeze_network = false;  // of init: only the static values learn
-  uint32_t network_rank = 0;    // above 0 the frozen network's kernels get a residual of this rank,
-                                // which learns (toolchain/model/low_rank.h)
+  AdapterSettings adapter;      // of a frozen network; learns beside the static values
   Schedule schedule{.peak = 2e-3,
                     .ramp_iterations = 50,
                     .floor_fraction = 0.02,
@@ -145,6 +152,7 @@ const char* to_string(TrainingBackground background);
 const char* to_string(TemplateMode mode);
 const char* to_string(OptimiserKind kind);
 const char* to_string(model::StaticColour colour);
+using model::to_string;  // of AdapterKind
 
 nlohmann::json to_json(const TrainSettings& settings);
 // Throws InputError "where: FIELD: reason".

@@ -9,7 +9,7 @@
 #include "toolchain/error.h"
 #include "toolchain/model/allocator.h"
 #include "toolchain/model/loss.h"
-#include "toolchain/model/low_rank.h"
+#include "toolchain/model/network_adapter.h"
 #include "toolchain/model/optimiser.h"
 #include "toolchain/model/perceptual.h"
 #include "toolchain/model/threads.h"
@@ -17,6 +17,7 @@
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/describe_run.h"
 #include "toolchain/train/interrupt.h"
+#include "toolchain/train/kernel_basis_file.h"
 #include "toolchain/train/lanes.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/person.h"
@@ -78,23 +79,26 @@ uint32_t threads_a_lane(const TrainSettings& settings) {
   return settings.threads / lane_count(settings);
 }
 
-// Of what learns of the network: all of it, its residual's factors, or nothing.
+// Of what learns of the network: all of it, its adapter's factors, or nothing.
 std::vector<model::ParameterGroup> network_groups(const AvatarModel& model,
-                                                  const model::LowRankResidual* residual) {
+                                                  const model::NetworkAdapter* adapter) {
   const TrainSettings& settings = model.settings();
-  if (residual != nullptr)
-    return model::adamw_group(static_cast<uint64_t>(residual->factors().numel()));
+  if (adapter != nullptr)
+    return model::adamw_group(static_cast<uint64_t>(adapter->factors().numel()));
   if (!model.has_network() || settings.freeze_network) return {};
   return settings.optimiser == OptimiserKind::kMuon
              ? model.unet().muon_groups()
              : model::adamw_group(model.unet().parameter_count());
 }
 
-std::unique_ptr<model::LowRankResidual> make_residual(const AvatarModel& model) {
+std::unique_ptr<model::NetworkAdapter> make_adapter(const AvatarModel& model) {
   const TrainSettings& settings = model.settings();
-  if (settings.network_rank == 0) return nullptr;
-  return std::make_unique<model::LowRankResidual>(model.unet(), settings.network_rank,
-                                                  settings.seed);
+  const AdapterSettings& adapter = settings.adapter;
+  if (adapter.rank == 0) return nullptr;
+  model::AdapterOptions options{
+      .kind = adapter.kind, .rank = adapter.rank, .seed = settings.seed, .basis = {}};
+  if (!adapter.basis.empty()) options.basis = read_kernel_basis(adapter.basis);
+  return std::make_unique<model::NetworkAdapter>(model.unet(), std::move(options));
 }
 
 using People = std::vector<std::unique_ptr<Person>>;
@@ -109,8 +113,8 @@ class Trainer {
         run_{request.run},
         description_(std::move(description)),
         people_(std::move(people)),
-        residual_(make_residual(model())),
-        optimiser_(network_groups(model(), residual_.get()),
+        adapter_(make_adapter(model())),
+        optimiser_(network_groups(model(), adapter_.get()),
                    adamw_options(settings, settings.weight_decay)) {
     for (size_t p = 1; p < people_.size(); ++p) people_[p]->share_network(*people_[0]);
     if (request.fake_quantisation == nullptr) return;
@@ -168,7 +172,7 @@ class Trainer {
   AvatarModel& model() { return people_[0]->model(); }
 
   bool network_learns() const {
-    return settings_.network && (!settings_.freeze_network || residual_ != nullptr);
+    return settings_.network && (!settings_.freeze_network || adapter_ != nullptr);
   }
 
   std::string title() const {
@@ -183,7 +187,7 @@ class Trainer {
 
   LearnedParts parts() {
     LearnedParts parts = model().parts();
-    parts.residual = residual_.get();
+    parts.adapter = adapter_.get();
     return parts;
   }
 
@@ -236,7 +240,7 @@ class Trainer {
       for (const auto& person : people_)
         load_initial_weights(settings_.init, person->model().parts());
     }
-    if (residual_) residual_->base().copy_(model().unet().weights().detach());
+    if (adapter_) adapter_->set_base(model().unet().weights());
     if (request_.fake_quantisation != nullptr) round_statics();
     measure_smallest_extents(0);
     description_["parts"] = describe_parts(model());
@@ -262,7 +266,7 @@ class Trainer {
         standoff_fade(train::progress(settings_.schedule.budget, state_.iteration, state_.seconds));
     lanes_.run([&](unsigned lane) {
       for (uint32_t i = lane; i < count; i += lanes)
-        poses[i] = pose_iteration(samples[i], person.model(lane), person.reference, fade);
+        poses[i] = pose_iteration(samples[i], person, lane, fade);
     });
     for (size_t i = 0; i < count; i += lanes) add_stages(poses[i].stages);
     StageClock last;
@@ -281,7 +285,7 @@ class Trainer {
       if (count > 1 && part->defined()) part->mul_(1.0 / count);
     }
     result.loss += add_penalty(person.model().statics(), static_gradients);
-    if (residual_ && gradients.defined()) gradients = residual_->gradients(gradients);
+    if (adapter_ && gradients.defined()) gradients = adapter_->gradients(gradients);
     if (!step(person, gradients, static_gradients, rate))
       fail(person, samples[0], "a gradient is not finite");
     last.add(state_.stages.optimiser);
@@ -317,11 +321,11 @@ class Trainer {
                                         static_rate);
   }
 
-  // gradients: of its weights or of its residual's factors.
+  // gradients: of its weights or of its adapter's factors.
   bool step_network(const torch::Tensor& gradients, double rate) {
-    if (residual_ == nullptr) return optimiser_.step(model().unet().weights(), gradients, rate);
-    if (!optimiser_.step(residual_->factors(), gradients, rate)) return false;
-    residual_->fold_into(model().unet().weights());
+    if (adapter_ == nullptr) return optimiser_.step(model().unet().weights(), gradients, rate);
+    if (!optimiser_.step(adapter_->factors(), gradients, rate)) return false;
+    adapter_->fold_into(model().unet().weights());
     return true;
   }
 
@@ -334,24 +338,27 @@ class Trainer {
     sum.loss += stages.loss, sum.perceptual += stages.perceptual;
   }
 
-  // reference: of the warm-up. fade: what is left of the stand-off's weight.
-  PoseResult pose_iteration(const Sample& sample, AvatarModel& model,
-                            const torch::Tensor& reference, double fade) const {
+  // fade: what is left of the stand-off's weight.
+  PoseResult pose_iteration(const Sample& sample, Person& person, unsigned lane,
+                            double fade) const {
     StageClock clock;
     PoseResult pose;
+    AvatarModel& model = person.model(lane);
     torch::Tensor output;
     if (network_learns()) {
       model.unet().zero_gradients();
       output = model.unet().forward(sample.posed.input);
     } else if (model.has_network()) {
-      const torch::NoGradGuard no_gradient;
-      output = model.unet().forward(sample.posed.input);
+      output = person.outputs.get(sample.frame, [&] {
+        const torch::NoGradGuard no_gradient;
+        return model.unet().forward(sample.posed.input);
+      });
     }
     clock.add(pose.stages.unet_forward);
     const torch::Tensor head = model.compose(output).requires_grad_();
     clock.add(pose.stages.compose);
     if (sample.number / settings_.poses_per_iteration < settings_.warmup_iterations) {
-      const torch::Tensor loss = reference_loss(head, reference);
+      const torch::Tensor loss = reference_loss(head, person.reference);
       pose.result.loss = loss.item<double>();
       loss.backward();
       clock.add(pose.stages.loss);
@@ -508,8 +515,8 @@ class Trainer {
   People people_;
   Lanes lanes_{lane_count(settings_),
                [count = threads_a_lane(settings_)] { model::use_threads(count); }};
-  std::unique_ptr<model::LowRankResidual> residual_;  // null unless settings ask for one
-  model::Optimiser optimiser_;                        // of what learns of the network
+  std::unique_ptr<model::NetworkAdapter> adapter_;  // null unless settings ask for one
+  model::Optimiser optimiser_;                      // of what learns of the network
   TrainingState state_;
   std::vector<LogRow> rows_;
   Means means_;

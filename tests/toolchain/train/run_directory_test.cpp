@@ -162,9 +162,10 @@ TEST_F(RunDirectoryTest, AnOldRunOfEdgeIsWhatItWas) {
 TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritten) {
   TrainSettings settings = network_alone(preset_settings("edge"));
   const nlohmann::json plain = to_json(settings);
-  for (const char* key : {"network", "network_size", "channels", "uv_size", "static_grids",
-                          "static_colour", "static_learning_rate", "clip_gradient",
-                          "smallest_extent", "antialiased", "freeze_network", "network_rank"}) {
+  for (const char* key :
+       {"network", "network_size", "channels", "uv_size", "static_grids", "static_colour",
+        "static_learning_rate", "clip_gradient", "smallest_extent", "antialiased", "freeze_network",
+        "network_rank", "network_adapter", "network_basis"}) {
     EXPECT_FALSE(plain.contains(key)) << key;
   }
   EXPECT_EQ(plain.at("loss").dump(),
@@ -178,7 +179,7 @@ TEST_F(RunDirectoryTest, SettingsOfBothPartsReadBackEqualAndDefaultsAreNotWritte
   settings.smallest_extent = settings.antialiased = true;
   settings.init = "other";
   settings.freeze_network = true;
-  settings.network_rank = 4;
+  settings.adapter = {.kind = model::AdapterKind::kBasis, .rank = 4, .basis = "b.safetensors"};
   settings.perceptual = {
       .file = "f.npz", .name = "LPIPS", .hash = "12", .weight = 0.5f, .window_px = 0};
   settings.static_colour = model::StaticColour::kSum;

@@ -1,5 +1,5 @@
-// One network for several people: trained on all of them, or frozen, or changed by a residual of
-// low rank that ends up in the kernels.
+// One network for several people: trained on all of them, or frozen, or changed by an adapter that
+// ends up in the kernels.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/interrupt.h"
+#include "toolchain/train/kernel_basis_file.h"
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/trained_avatar.h"
 #include "toolchain/train/trainer.h"
@@ -72,7 +73,7 @@ TEST(Training, OfALowRankResidualLeavesTheSumInTheKernelsAndBiasesAlone) {
   TrainRequest straight = both_parts(folder.path("straight"), 12);
   straight.settings.init = run_of_both_parts();
   straight.settings.freeze_network = true;
-  straight.settings.network_rank = 2;
+  straight.settings.adapter.rank = 2;
   straight.settings.clip_gradient = 1e-2;
   train_avatar(straight);
   TrainRequest broken = straight;
@@ -88,7 +89,7 @@ TEST(Training, OfALowRankResidualLeavesTheSumInTheKernelsAndBiasesAlone) {
   const TensorFile first = read_tensor_file(RunDirectory{run_of_both_parts()}.weights()),
                    tuned = read_tensor_file(RunDirectory{straight.run}.weights()),
                    checkpoint = read_tensor_file(RunDirectory{straight.run}.checkpoint());
-  const std::vector<float>& factors = checkpoint.tensors.at("residual.factors").values;
+  const std::vector<float>& factors = checkpoint.tensors.at("adapter.factors").values;
   size_t at = 0;
   double largest = 0, moved = 0;
   for (int layer = 0; layer < 15; ++layer) {
@@ -112,7 +113,7 @@ TEST(Training, OfALowRankResidualLeavesTheSumInTheKernelsAndBiasesAlone) {
   EXPECT_LT(largest, 1e-6);
   EXPECT_GT(moved, 1e-3);
   const nlohmann::json parts = read_run({straight.run}).json.at("parts");
-  EXPECT_EQ(parts.at("network").at("residual").at("values"), factors.size());
+  EXPECT_EQ(parts.at("network").at("adapter").at("values"), factors.size());
   TrainedAvatar avatar = TrainedAvatar::open({.run = straight.run});
   const AlignedBytes bytes(pack_avatar(avatar, {straight.run}, {}));
   const Package package = value_or_throw(Package::open(bytes.bytes(), "package"), "package");
@@ -123,6 +124,62 @@ TEST(Training, OfALowRankResidualLeavesTheSumInTheKernelsAndBiasesAlone) {
   bad.run = folder.path("bad");
   bad.settings.freeze_network = false;
   EXPECT_NE(error_of(bad).find("network_rank"), std::string::npos) << error_of(bad);
+}
+
+TEST(Training, OfABasisMovesKernelsInItsDirectionsAloneAndGoesOnWithThatBasisAlone) {
+  const TemporaryFolder folder;
+  TrainRequest free = both_parts(folder.path("free"), 8);
+  free.settings.init = run_of_both_parts();
+  train_avatar(free);
+  const std::string basis = folder.path("basis.safetensors");
+  const KernelBasisReport report = make_kernel_basis(run_of_both_parts(), {free.run}, 2, basis);
+  EXPECT_EQ(report.people, 1u);
+  ASSERT_EQ(report.energy.size(), 15u);
+  for (const double share : report.energy) EXPECT_GT(share, 0.05);
+
+  TrainRequest straight = both_parts(folder.path("straight"), 12);
+  straight.settings.init = run_of_both_parts();
+  straight.settings.freeze_network = true;
+  straight.settings.adapter = {.kind = model::AdapterKind::kBasis, .rank = 2, .basis = basis};
+  train_avatar(straight);
+  TrainRequest broken = straight;
+  broken.run = folder.path("broken");
+  broken.stop_after = 5;
+  EXPECT_THROW(train_avatar(broken), Interrupted);
+  broken.stop_after = 0;
+  broken.resume = true;
+  train_avatar(broken);
+  EXPECT_TRUE(bytes_of(RunDirectory{straight.run}.weights()) ==
+              bytes_of(RunDirectory{broken.run}.weights()));
+
+  // Whatever a kernel changed by lies in its two directions.
+  const TensorFile first = read_tensor_file(RunDirectory{run_of_both_parts()}.weights()),
+                   tuned = read_tensor_file(RunDirectory{straight.run}.weights());
+  const model::KernelBasis directions = read_kernel_basis(basis);
+  double outside = 0, moved = 0;
+  for (size_t layer = 0; layer < directions.size(); ++layer) {
+    const std::string name = "layer." + std::to_string(layer) + ".weight";
+    const int64_t columns = directions[layer].size(1);
+    const torch::Tensor difference =
+        torch::tensor(at::ArrayRef<float>(tuned.tensors.at(name).values)).view({-1, columns}) -
+        torch::tensor(at::ArrayRef<float>(first.tensors.at(name).values)).view({-1, columns});
+    const torch::Tensor inside =
+        at::mm(at::mm(difference, directions[layer].t()), directions[layer]);
+    outside = std::max(outside, (difference - inside).abs().max().item<double>());
+    moved = std::max(moved, difference.abs().max().item<double>());
+  }
+  std::printf("largest step %.3g, outside of the basis %.3g\n", moved, outside);
+  EXPECT_GT(moved, 1e-3);
+  EXPECT_LT(outside, 1e-6);
+
+  TrainRequest other = straight;
+  other.run = folder.path("other");
+  other.stop_after = 5;
+  EXPECT_THROW(train_avatar(other), Interrupted);
+  make_kernel_basis(free.run, {run_of_both_parts(), straight.run}, 2, basis);
+  other.stop_after = 0;
+  other.resume = true;
+  EXPECT_NE(error_of(other).find("network_basis"), std::string::npos) << error_of(other);
 }
 
 // The capture under two names.
