@@ -23,8 +23,8 @@ import os
 import pathlib
 import subprocess
 import sys
-import time
 
+import neighbours
 import results
 
 FIGURINE = pathlib.Path("build/release/samples/figurine/figurine")
@@ -104,25 +104,6 @@ class Group:
         self.remove()
 
 
-class Neighbour:
-    """Spins on one CPU."""
-
-    def __init__(self, cpu):
-        self.cpu = cpu
-
-    def __enter__(self):
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", "while True: pass"],
-            preexec_fn=lambda: os.sched_setaffinity(0, {self.cpu}),
-        )
-        time.sleep(0.2)
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
-
-
 def measure(options, threads, group=None):
     """A row of one run."""
     command = [FIGURINE, "bench", *PERSON, *FRAME, "--hz", options.hz, "--frames", options.frames]
@@ -159,7 +140,7 @@ def rows_of(options):
     last_cpu = max(os.sched_getaffinity(0))
     for threads in (1, None):
         yield {"case": "alone"} | measure(options, threads)
-        with Neighbour(last_cpu):
+        with neighbours.busy(cpu=last_cpu):
             yield {"case": "busy neighbour", "neighbours_cpu": last_cpu} | measure(options, threads)
     for cpus in QUOTAS:
         case = {"case": f"quota of {cpus:g} CPUs", "quota_cpus": cpus}

@@ -30,6 +30,7 @@ import subprocess
 import sys
 import tempfile
 
+import neighbours
 import results
 
 PERSON, BODY = "samples/packages/person.fgn", "samples/packages/body-128.fgn"
@@ -68,16 +69,10 @@ def wait_for_port(process, errors):
     sys.exit(f"live.py: figurine ended: {errors.read_text()}")
 
 
-def live_run(tools, rate, seconds, neighbour, folder):
-    """One run; its row."""
-    fifo, summary, errors = folder / "fifo", folder / "live.json", folder / "errors"
-    fifo.unlink(missing_ok=True)
-    os.mkfifo(fifo)
-    others = []
+def draw_live(tools, rate, seconds, fifo, summary, errors):
+    """Sender, `figurine live` and a reader of its FIFO, until the seconds are over."""
+    others = [subprocess.Popen(["cat", str(fifo)], stdout=subprocess.DEVNULL)]
     try:
-        if neighbour:
-            others.append(subprocess.Popen([sys.executable, "-c", "while True: pass"]))
-        others.append(subprocess.Popen(["cat", str(fifo)], stdout=subprocess.DEVNULL))
         with open(errors, "w") as log:
             live = subprocess.Popen(
                 [tools["figurine"], "live", PERSON, "--pose", "vmc://:0", "-o", str(fifo),
@@ -93,6 +88,15 @@ def live_run(tools, rate, seconds, neighbour, folder):
         for process in others:
             process.kill()
             process.wait()
+
+
+def live_run(tools, rate, seconds, neighbour, folder):
+    """One run; its row."""
+    fifo, summary, errors = folder / "fifo", folder / "live.json", folder / "errors"
+    fifo.unlink(missing_ok=True)
+    os.mkfifo(fifo)
+    with neighbours.busy(1 if neighbour else 0):
+        draw_live(tools, rate, seconds, fifo, summary, errors)
     said = json.loads(summary.read_text())
     return {
         "rate_hz": rate,

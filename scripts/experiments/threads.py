@@ -25,6 +25,7 @@ import tempfile
 import threading
 import time
 
+import neighbours
 import results
 
 QUICK = os.environ.get("FIGURINE_QUICK", "") != ""
@@ -87,25 +88,10 @@ def write_capture(program, folder):
     timed([*command, "-o", folder / "capture"])
 
 
-class Neighbours:
-    def __init__(self, count):
-        self.count = count
-
-    def __enter__(self):
-        spin = [sys.executable, "-c", "while True: pass"]
-        self.processes = [subprocess.Popen(spin) for _ in range(self.count)]
-        time.sleep(0.2 if self.count else 0)
-
-    def __exit__(self, *_):
-        for process in self.processes:
-            process.kill()
-            process.wait()
-
-
-def measure(cases, neighbours):
+def measure(cases, count):
     """{case: {wall_s, cpu_s, runs}}; cases: {name: what gives wall and CPU seconds}, by turns."""
     seen = {name: [] for name in cases}
-    with Neighbours(neighbours):
+    with neighbours.busy(count):
         for _ in range(RUNS):
             for name, case in cases.items():
                 if not seen[name] or seen[name][0][0] < LONG_S:
@@ -124,11 +110,11 @@ def measure_all(what, thread_counts, cases_of):
     """A row for threads x neighbours; cases_of: the cases of so many threads."""
     rows = []
     for threads in thread_counts:
-        for neighbours in NEIGHBOURS:
-            seen = measure(cases_of(threads), neighbours)
-            rows.append({"threads": threads, "neighbours": neighbours} | seen)
+        for count in NEIGHBOURS:
+            seen = measure(cases_of(threads), count)
+            rows.append({"threads": threads, "neighbours": count} | seen)
             walls = ", ".join(f"{name} {case['wall_s']:.2f} s" for name, case in seen.items())
-            print(f"{what}: {threads} threads, {neighbours} neighbours: {walls}", flush=True)
+            print(f"{what}: {threads} threads, {count} neighbours: {walls}", flush=True)
     return rows
 
 
