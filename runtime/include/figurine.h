@@ -118,10 +118,13 @@ typedef struct fig_package_options {
   const char* name; /* in front of messages about it, a file's name for example; "package" */
   int copy;         /* 0: the bytes are borrowed, must start at a multiple of 64 and stay unchanged
                        until fig_package_close; 1: the library keeps a copy of its own */
+  int for_drawing;  /* 1: only what drawing takes is verified and read, of an avatar that has its
+                       network in floats and in fixed point the latter; 0: everything */
 } fig_package_options;
 FIG_DEFAULT(package_options)
 
-/* Opens a package and verifies all of it; after that, nothing that reads it can fail. */
+/* Opens a package and verifies all that is wanted of it; after that, nothing that reads it can
+ * fail. */
 FIG_API fig_status fig_package_open(const void* bytes, size_t size_bytes,
                                     const fig_package_options* options, fig_package* package);
 /* FIG_INVALID_ARGUMENT while an avatar of a renderer, a sampler or a sampled avatar uses it. */

@@ -154,7 +154,8 @@ using namespace figurine;
 using namespace figurine::c;
 
 static fig_package_options default_package_options() {
-  return {.struct_bytes = sizeof(fig_package_options), .name = "package", .copy = 0};
+  return {
+      .struct_bytes = sizeof(fig_package_options), .name = "package", .copy = 0, .for_drawing = 0};
 }
 void fig_set_default_package_options(fig_package_options* value, size_t struct_bytes) {
   set_default(default_package_options(), value, struct_bytes);
@@ -227,7 +228,8 @@ fig_status fig_package_open(const void* bytes, size_t size_bytes,
     if (size_bytes > 0) std::memcpy(copy.data(), bytes, size_bytes);
     content = {copy.data(), size_bytes};
   }
-  Result<Package> opened = Package::open(content, name);
+  Result<Package> opened = Package::open(
+      content, name, read.for_drawing != 0 ? OpenOptions::for_drawing() : OpenOptions{});
   if (!opened.ok()) return report(opened.status());
   std::unique_ptr<PackageObject> object(
       new (std::nothrow) PackageObject(std::move(copy), std::move(opened).value()));
