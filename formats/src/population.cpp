@@ -1,6 +1,8 @@
 #include "figurine/population.h"
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 
 #include "figurine/check.h"
 #include "figurine/detail/rans.h"
@@ -22,15 +24,22 @@ Counts count(const Network& network) {
   return counts;
 }
 
-std::span<const uint8_t> stream_of(const Population& population, size_t member) {
-  const size_t begin = member == 0 ? 0 : population.code_end[member - 1];
-  return population.code.subspan(begin, population.code_end[member] - begin);
+std::span<const uint8_t> stream_of(std::span<const uint8_t> code,
+                                   std::span<const uint32_t> code_end, size_t member) {
+  const size_t begin = member == 0 ? 0 : code_end[member - 1];
+  return code.subspan(begin, code_end[member] - begin);
+}
+
+size_t static_values(const StaticPart& part) {
+  size_t count = 0;
+  for (const StaticGroup& group : part.groups) count += group.values.size();
+  return count;
 }
 
 // out = initial + scale q, convolution by convolution.
 void add_int8(const Population& population, size_t member, std::span<const float> scale,
               std::span<float> out) {
-  RansDecoder decoder(stream_of(population, member));
+  RansDecoder decoder(stream_of(population.code, population.code_end, member));
   size_t at = 0, row = 0, convolution = 0;
   for (const Layer& layer : population.network.layers) {
     if (layer.op != LayerOp::kConv2d) continue;
@@ -55,6 +64,31 @@ void add_half(const Population& population, std::span<const Half> difference,
   }
 }
 
+// The member's integers, [static_values], and its part over them.
+StaticPart add_static_values(const Population& population, size_t member,
+                             std::span<const float> scale, std::span<int8_t> out) {
+  RansDecoder decoder(stream_of(population.static_code, population.static_code_end, member));
+  StaticPart part;
+  size_t channel = 0;
+  for (const StaticGroup& mean : population.static_part.groups) {
+    StaticGroup& own = part.groups.emplace_back(mean);
+    own.scale = scale.subspan(channel, mean.channels);
+    for (uint32_t c = 0; c < mean.channels; ++c) {
+      const RansTable table(
+          population.static_frequency.subspan((channel + c) * kRansValues, kRansValues));
+      for (size_t k = c; k < mean.values.size(); k += mean.channels) {
+        const int8_t predicted =
+            predict_static(mean.scale[c] * static_cast<float>(mean.values[k]), own.scale[c]);
+        out[k] = add_static(predicted, static_cast<int8_t>(decoder.next(table)));
+      }
+    }
+    own.values = out.first(mean.values.size());
+    out = out.subspan(mean.values.size());
+    channel += mean.channels;
+  }
+  return part;
+}
+
 // The member's row of an array of M equal rows.
 template <class T>
 std::span<const T> row_of(std::span<const T> array, const Population& population, size_t member) {
@@ -65,7 +99,9 @@ std::span<const T> row_of(std::span<const T> array, const Population& population
 }  // namespace
 
 const char* to_string(DifferenceCoding coding) {
-  return coding == DifferenceCoding::kInt8 ? "q8" : "f16";
+  return coding == DifferenceCoding::kInt8   ? "q8"
+         : coding == DifferenceCoding::kHalf ? "f16"
+                                             : "none";
 }
 
 const char* to_string(Split split) {
@@ -76,10 +112,29 @@ uint64_t difference_bytes(const Population& population, size_t member) {
   const auto rows = [&](const auto& array) {
     return row_of(array, population, member).size_bytes();
   };
-  const size_t differences = population.coding == DifferenceCoding::kInt8
-                                 ? rows(population.scale) + stream_of(population, member).size()
-                                 : rows(population.difference);
-  return rows(population.bias) + differences;
+  size_t bytes = rows(population.bias) + rows(population.static_scale);
+  if (population.coding == DifferenceCoding::kInt8) {
+    bytes +=
+        rows(population.scale) + stream_of(population.code, population.code_end, member).size();
+  } else if (population.coding == DifferenceCoding::kHalf) {
+    bytes += rows(population.difference);
+  }
+  if (!population.static_part.empty())
+    bytes += stream_of(population.static_code, population.static_code_end, member).size();
+  return bytes;
+}
+
+int8_t predict_static(float mean, float scale) {
+  return static_cast<int8_t>(clamp_and_round(mean / scale, -127, 127));
+}
+
+int8_t add_static(int8_t predicted, int8_t difference) {
+  const int sum = predicted + difference;
+  return static_cast<int8_t>(sum > 127 ? sum - 255 : sum < -127 ? sum + 255 : sum);
+}
+
+int8_t subtract_static(int8_t value, int8_t predicted) {
+  return add_static(value, static_cast<int8_t>(-predicted));
 }
 
 void pose_covariance(const Population& population, size_t member, std::span<float> covariance) {
@@ -97,39 +152,62 @@ void pose_covariance(const Population& population, size_t member, std::span<floa
   }
 }
 
-size_t member_floats(const Population& population) {
-  const size_t features = 3 * population.pose_joints.size();
-  return count(population.network).weights + features * features;
+namespace {
+
+// Floats of storage that the member's kernels need.
+size_t own_weights(const Population& population) {
+  return population.coding == DifferenceCoding::kNone ? 0 : count(population.network).weights;
 }
 
-Avatar open_member(const Population& population, size_t member, std::span<float> storage) {
-  FIG_CHECK(member < population.size(), "a member of the population");
-  FIG_CHECK(storage.size() >= member_floats(population), "room for the member's floats");
-  const Counts counts = count(population.network);
-  const std::span<float> weights = storage.first(counts.weights);
+// The member's kernels and biases in place of the initial ones.
+void take_weights(const Population& population, size_t member, std::span<float> weights,
+                  Network& network) {
+  if (population.coding == DifferenceCoding::kNone) return;
   if (population.coding == DifferenceCoding::kInt8) {
     add_int8(population, member, row_of(population.scale, population, member), weights);
   } else {
     add_half(population, row_of(population.difference, population, member), weights);
   }
-
-  const PopulationMember& own = population.members[member];
-  Avatar avatar;
-  avatar.kind() = population.kind();
-  avatar.traits() = own.traits();
-  avatar.name = own.name;
-  avatar.shape = row_of(population.shape, population, member);
   const std::span<const float> bias = row_of(population.bias, population, member);
   size_t at = 0, row = 0;
-  for (Layer& layer : avatar.network.layers) {
+  for (Layer& layer : network.layers) {
     const size_t layer_weights = layer.weights.size(), layer_rows = layer.bias.size();
     layer.weights = weights.subspan(at, layer_weights);
     layer.bias = bias.subspan(row, layer_rows);
     at += layer_weights;
     row += layer_rows;
   }
-  if (const size_t features = 3 * population.pose_joints.size(); features > 0) {
-    const std::span<float> covariance = storage.subspan(counts.weights, features * features);
+}
+
+}  // namespace
+
+size_t member_floats(const Population& population) {
+  const size_t features = 3 * population.pose_joints.size();
+  return own_weights(population) + features * features +
+         (static_values(population.static_part) + sizeof(float) - 1) / sizeof(float);
+}
+
+Avatar open_member(const Population& population, size_t member, std::span<float> storage) {
+  FIG_CHECK(member < population.size(), "a member of the population");
+  FIG_CHECK(storage.size() >= member_floats(population), "room for the member's floats");
+  const size_t weights = own_weights(population), features = 3 * population.pose_joints.size();
+  const PopulationMember& own = population.members[member];
+  Avatar avatar;
+  avatar.kind() = population.kind();
+  avatar.traits() = own.traits();
+  avatar.name = own.name;
+  avatar.shape = row_of(population.shape, population, member);
+  avatar.uv_size = population.uv_size;
+  avatar.antialiased = population.antialiased;
+  take_weights(population, member, storage.first(weights), avatar.network);
+  if (const size_t values = static_values(population.static_part); values > 0) {
+    float* const room = storage.subspan(weights + features * features).data();
+    avatar.static_part =
+        add_static_values(population, member, row_of(population.static_scale, population, member),
+                          {reinterpret_cast<int8_t*>(room), values});
+  }
+  if (features > 0) {
+    const std::span<float> covariance = storage.subspan(weights, features * features);
     pose_covariance(population, member, covariance);
     avatar.pose_statistics = {population.pose_joints,
                               row_of(population.pose_mean, population, member), covariance};

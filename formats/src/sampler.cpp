@@ -13,11 +13,14 @@ std::vector<size_t> sampler_token_sizes(const Sampler& sampler) {
   FIG_CHECK(shapes.ok(), "the network's shapes");
   std::vector<size_t> sizes;
   for (const Layer& layer : sampler.network.layers) {
-    if (layer.op != LayerOp::kConv2d) continue;
+    if (layer.op != LayerOp::kConv2d || sampler.shares_network) continue;
     const size_t inputs = size_t{layer.kernel} * layer.kernel * (*shapes)[layer.inputs[0]].channels;
     sizes.push_back(layer.out_channels * (inputs + 1));
   }
   if (sampler.shape_count > 0) sizes.push_back(sampler.shape_count);
+  for (const SampledStaticGroup& group : sampler.static_groups) {
+    for (const uint32_t rows : group.patch_rows) sizes.push_back(size_t{rows} * group.channels);
+  }
   return sizes;
 }
 

@@ -29,8 +29,7 @@ const char* shape_fault(const StaticGroup& group, uint32_t uv_size, uint32_t& ta
   return nullptr;
 }
 
-const char* value_fault(const StaticGroup& group) {
-  if (std::ranges::find(group.values, int8_t{-128}) != group.values.end()) return "a value is -128";
+const char* scale_fault(const StaticGroup& group) {
   for (uint32_t c = 0; c < group.channels; ++c) {
     const float bound =
         group.first_channel + c < kStaticColour ? kMaxStaticValue : kMaxStaticLogGain;
@@ -39,6 +38,11 @@ const char* value_fault(const StaticGroup& group) {
     if (!(scale * 127 <= bound)) return "a scale is too large";
   }
   return nullptr;
+}
+
+const char* value_fault(const StaticGroup& group) {
+  if (std::ranges::find(group.values, int8_t{-128}) != group.values.end()) return "a value is -128";
+  return scale_fault(group);
 }
 
 size_t covered_cells(const Body& body, uint32_t size) {
@@ -60,6 +64,13 @@ Status validate_static_part(const StaticPart& part, uint32_t uv_size) {
   for (size_t g = 0; g < part.groups.size(); ++g) {
     if (const char* what = shape_fault(part.groups[g], uv_size, taken)) return fault(g, what);
     if (const char* what = value_fault(part.groups[g])) return fault(g, what);
+  }
+  return {};
+}
+
+Status validate_static_scales(const StaticPart& part) {
+  for (size_t g = 0; g < part.groups.size(); ++g) {
+    if (const char* what = scale_fault(part.groups[g])) return fault(g, what);
   }
   return {};
 }

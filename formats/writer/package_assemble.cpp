@@ -183,12 +183,15 @@ Offset<void> build_content(FlatBufferBuilder& b, const Population& population,
   for (size_t m = 0; m < population.size(); ++m)
     members.push_back(build_member(b, population.members[m], own[m]));
   const auto member_list = b.CreateVector(members);
-  return schema::CreatePopulation(b, body_name, population.body_hash[0], population.body_hash[1],
-                                  preset,
-                                  static_cast<schema::TemplateMode>(population.template_mode),
-                                  population.fourier_octaves, network,
-                                  static_cast<schema::DifferenceCoding>(population.coding),
-                                  quality_names, pose_joints, member_list)
+  const auto static_groups = build_static_groups(b, population.static_part);
+  const uint32_t uv_size =
+      population.texels_a_side() != population.network.input_size ? population.uv_size : 0;
+  return schema::CreatePopulation(
+             b, body_name, population.body_hash[0], population.body_hash[1], preset,
+             static_cast<schema::TemplateMode>(population.template_mode),
+             population.fourier_octaves, network,
+             static_cast<schema::DifferenceCoding>(population.coding), quality_names, pose_joints,
+             member_list, uv_size, static_groups, population.antialiased)
       .Union();
 }
 
@@ -213,12 +216,23 @@ Offset<void> build_content(FlatBufferBuilder& b, const Sampler& sampler) {
                                     method(golden_seed.method), golden_seed.hash[0],
                                     golden_seed.hash[1]);
   });
+  // No empty list, and no side that follows from the network: other samplers keep their bytes.
+  Offset<flatbuffers::Vector<Offset<schema::SampledStaticGroup>>> static_groups = 0;
+  if (!sampler.static_groups.empty()) {
+    static_groups = build_list(b, sampler.static_groups, [&](const SampledStaticGroup& group) {
+      const auto rows = b.CreateVector(group.patch_rows);
+      return schema::CreateSampledStaticGroup(b, group.first_channel, group.grid_size, rows);
+    });
+  }
+  const uint32_t uv_size =
+      sampler.texels_a_side() != sampler.network.input_size ? sampler.uv_size : 0;
   return schema::CreateSampler(b, body_name, sampler.body_hash[0], sampler.body_hash[1], preset,
                                static_cast<schema::TemplateMode>(sampler.template_mode),
                                sampler.fourier_octaves, network, sampler.shape_count, &statistics,
                                decoding, values, pose_statistics, golden, ranks, denoiser, noise,
                                sampler.steps, method(sampler.method), golden_seeds,
-                               sampler.population_hash[0], sampler.population_hash[1])
+                               sampler.population_hash[0], sampler.population_hash[1], uv_size,
+                               static_groups, sampler.antialiased, sampler.shares_network)
       .Union();
 }
 

@@ -80,11 +80,12 @@ void add_float_weights(const std::string& prefix, const Network& network,
   }
 }
 
-void add_fixed_point(const Avatar& avatar, const std::vector<ValueShape>& shapes, PartList& list) {
-  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
-    const Layer& layer = avatar.network.layers[i];
+void add_fixed_point(const Network& network, const FixedPointNetwork& fixed,
+                     const std::vector<ValueShape>& shapes, PartList& list) {
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    const Layer& layer = network.layers[i];
     if (layer.op != LayerOp::kConv2d) continue;
-    const FixedPointConvolution& convolution = avatar.fixed_point.convolutions[i];
+    const FixedPointConvolution& convolution = fixed.convolutions[i];
     const std::string name = "fixed." + std::to_string(i);
     list.add(name + ".weights", convolution.weights,
              {layer.kernel, layer.kernel, shapes[layer.inputs[0]].channels}, layer.out_channels);
@@ -115,7 +116,20 @@ Status add_network(const Avatar& avatar, PackageParts& parts, PartList& list) {
   if (avatar.fixed_point.convolutions.size() != avatar.network.layers.size())
     return Status(StatusCode::kInvalidArgument, "avatar.fixed_point: not one entry per layer");
   parts.required_features |= kFeatureFixedPoint;
-  add_fixed_point(avatar, *shapes, list);
+  add_fixed_point(avatar.network, avatar.fixed_point, *shapes, list);
+  return {};
+}
+
+// Of all of a sampler's avatars, in floats and in fixed point.
+Status add_shared_network(const Sampler& sampler, PackageParts& parts, PartList& list) {
+  if (!sampler.shares_network) return {};
+  const Result<std::vector<ValueShape>> shapes = infer_shapes(sampler.network, true);
+  if (!shapes.ok()) return Status(StatusCode::kInvalidArgument, shapes.status().message());
+  if (sampler.fixed_point.convolutions.size() != sampler.network.layers.size())
+    return Status(StatusCode::kInvalidArgument, "sampler.fixed_point: not one entry per layer");
+  parts.required_features |= kFeatureFixedPoint;
+  add_float_weights("network", sampler.network, *shapes, list);
+  add_fixed_point(sampler.network, sampler.fixed_point, *shapes, list);
   return {};
 }
 
@@ -212,15 +226,25 @@ Result<PackageParts> take_apart(const Population& population, const Budget& budg
     return static_cast<uint32_t>(array.size() / members);
   };
   if (!p.shape.empty()) list.add("population.shape", p.shape, {row_of(p.shape)}, members);
-  list.add("population.bias", p.bias, {rows}, members);
+  if (p.coding != DifferenceCoding::kNone) list.add("population.bias", p.bias, {rows}, members);
   if (p.coding == DifferenceCoding::kInt8) {
     list.add("population.scale", p.scale, {rows}, members);
     list.add("population.frequency", p.frequency, {uint32_t{kRansValues}}, convolutions);
     list.add("population.code", p.code);
     list.add("population.code_end", p.code_end, {}, members);
-  } else {
+  } else if (p.coding == DifferenceCoding::kHalf) {
     list.add("population.difference", p.difference, {weights}, members);
   }
+  if (!p.static_part.empty()) {
+    const uint32_t channels = row_of(p.static_scale);
+    add_static_part(p.static_part, list);
+    list.add("population.static_scale", p.static_scale, {channels}, members);
+    list.add("population.static_frequency", p.static_frequency, {uint32_t{kRansValues}}, channels);
+    list.add("population.static_code", p.static_code);
+    list.add("population.static_code_end", p.static_code_end, {}, members);
+  }
+  if (layout::needs_static_feature(p)) parts.required_features |= kFeatureStaticPart;
+  if (layout::needs_filter_feature(p)) parts.required_features |= kFeatureFilters;
   if (const auto features = static_cast<uint32_t>(3 * p.pose_joints.size()); features != 0) {
     list.add("pose.mean", p.pose_mean, {features}, members);
     list.add("pose.factor", p.pose_factor, {features * (features + 1) / 2}, members);
@@ -260,6 +284,8 @@ Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget,
     matrix_bytes += size_t{matrix.rows} * matrix.columns;
   }
   if (sampler.decoding.max_offset != 0) parts.required_features |= kFeatureBoundedOffsets;
+  if (layout::needs_static_feature(sampler)) parts.required_features |= kFeatureStaticPart;
+  if (layout::needs_filter_feature(sampler)) parts.required_features |= kFeatureFilters;
   const uint32_t d = sampler.denoiser.d_model;
   PartList list(parts.blobs);
   list.add("space.mean", sampler.mean, {}, values);
@@ -272,6 +298,12 @@ Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget,
   list.add("denoiser.norm", sampler.norm, {2, d}, size_t{2} * sampler.denoiser.blocks + 1);
   add_pose_statistics(sampler.pose_statistics, list);
   list.add("golden.rotations", sampler.golden.rotations, {4});
+  FIG_RETURN_IF_ERROR(add_shared_network(sampler, parts, list));
+  for (size_t g = 0; g < sampler.static_groups.size(); ++g) {
+    const std::string name = "static." + std::to_string(g);
+    list.add(name + ".scale", sampler.static_groups[g].scale);
+    list.add(name + ".row", sampler.static_groups[g].row);
+  }
   list.add("sampler.report", std::span(reinterpret_cast<const uint8_t*>(sampler.report.data()),
                                        sampler.report.size()));
   if (!list.status().ok()) return list.status();

@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "formats/writer/package_parts.h"
 #include "formats/writer/package_writer.h"
 #include "formats/writer/rans_encoder.h"
+#include "formats/writer/static_codes.h"
 
 namespace figurine {
 
@@ -26,35 +28,16 @@ bool same_shape(const Network& a, const Network& b) {
          std::ranges::equal(a.layers, b.layers, same);
 }
 
-Status check_alike(const NewMember& member, const NewPopulation& population) {
+bool same_weights(const Network& a, const Network& b) {
+  return std::ranges::equal(a.layers, b.layers, [](const Layer& x, const Layer& y) {
+    return std::ranges::equal(x.weights, y.weights) && std::ranges::equal(x.bias, y.bias);
+  });
+}
+
+// Person and pose, whatever the network.
+Status check_person_alike(const NewMember& member, const NewPopulation& population) {
   const Avatar &own = *member.avatar, &first = *population.members.front().avatar;
   const std::string of_first = ", '" + first.name + "' has ";
-  if (!own.static_part.empty() || own.texels_a_side() != own.network.input_size)
-    return mismatch(member,
-                    "has a static part, or a network coarser than its texels: a population "
-                    "does not hold them");
-  if (!own.smallest_extents.empty() || own.antialiased)
-    return mismatch(member,
-                    "has smallest extents, or is antialiased: a population does not hold that");
-  if (!own.holds(Precision::kFloat32))
-    return mismatch(member, "holds no float weights (figurine-train pack --precision f32)");
-  if (own.body_hash != first.body_hash) {
-    return mismatch(member, "was made for the body '" + own.body_name + "' " +
-                                format_hash(own.body_hash) + of_first + "'" + first.body_name +
-                                "' " + format_hash(first.body_hash));
-  }
-  if (!same_shape(own.network, population.initial)) {
-    return mismatch(member, "its network has another shape than the initial weights (" +
-                                std::to_string(count_parameters(own.network)) +
-                                " parameters, not " +
-                                std::to_string(count_parameters(population.initial)) + ")");
-  }
-  if (own.template_mode != first.template_mode)
-    return mismatch(member, "has its Gaussians on another template than '" + first.name + "'");
-  if (own.fourier_octaves != first.fourier_octaves) {
-    return mismatch(member, "has " + std::to_string(own.fourier_octaves) + " Fourier octaves" +
-                                of_first + std::to_string(first.fourier_octaves));
-  }
   if (own.shape.size() != first.shape.size()) {
     return mismatch(member, "has " + std::to_string(own.shape.size()) + " shape coefficients" +
                                 of_first + std::to_string(first.shape.size()));
@@ -71,8 +54,50 @@ Status check_alike(const NewMember& member, const NewPopulation& population) {
   return {};
 }
 
+Status check_alike(const NewMember& member, const NewPopulation& population) {
+  const bool alike = population.coding == DifferenceCoding::kNone;  // in their networks
+  const Avatar &own = *member.avatar,
+               &first = alike ? *population.shared : *population.members.front().avatar;
+  const std::string of_first = ", '" + first.name + "' has ";
+  if (!same_groups(own.static_part, first.static_part))
+    return mismatch(member, "its static part has other groups than that of '" + first.name + "'");
+  if (!own.smallest_extents.empty())
+    return mismatch(member, "has smallest extents: a population does not hold them");
+  if (own.has_network() && !own.holds(Precision::kFloat32))
+    return mismatch(member, "holds no float weights (figurine-train pack --precision f32)");
+  if (own.body_hash != first.body_hash) {
+    return mismatch(member, "was made for the body '" + own.body_name + "' " +
+                                format_hash(own.body_hash) + of_first + "'" + first.body_name +
+                                "' " + format_hash(first.body_hash));
+  }
+  if (own.template_mode != first.template_mode)
+    return mismatch(member, "has its Gaussians on another template than '" + first.name + "'");
+  const bool drawn_alike =
+      own.antialiased == first.antialiased && own.texels_a_side() == first.texels_a_side();
+  const Status otherwise = mismatch(member, "is drawn otherwise than '" + first.name +
+                                                "': antialiased, or for another number of texels");
+  if (alike && !own.has_network())
+    return drawn_alike ? check_person_alike(member, population) : otherwise;
+  if (!same_shape(own.network, population.initial)) {
+    return mismatch(member, "its network has another shape than the initial weights (" +
+                                std::to_string(count_parameters(own.network)) +
+                                " parameters, not " +
+                                std::to_string(count_parameters(population.initial)) + ")");
+  }
+  if (!drawn_alike) return otherwise;
+  if (alike && !same_weights(own.network, population.initial))
+    return mismatch(member, "its network has other weights than that of '" + first.name + "'");
+  if (own.fourier_octaves != first.fourier_octaves) {
+    return mismatch(member, "has " + std::to_string(own.fourier_octaves) + " Fourier octaves" +
+                                of_first + std::to_string(first.fourier_octaves));
+  }
+  return check_person_alike(member, population);
+}
+
 // The arrays behind a Population's spans.
 struct Storage {
+  std::optional<MeanStaticPart> mean;  // where nobody's is given
+  StaticCodes statics;
   std::vector<float> shape, bias, scale, pose_mean, golden_poses;
   std::vector<int16_t> frequency;
   std::vector<uint8_t> code;
@@ -172,6 +197,23 @@ void add_factor(std::span<const float> matrix, size_t n, std::vector<Half>& out)
   }
 }
 
+// The members' maps against the shared one, or against their mean.
+Status take_static_parts(const NewPopulation& from, Storage& storage, Population& to) {
+  std::vector<const StaticPart*> parts;
+  for (const NewMember& member : from.members) parts.push_back(&member.avatar->static_part);
+  if (parts.front()->empty()) return {};
+  if (from.shared == nullptr) storage.mean.emplace(parts);
+  to.static_part = storage.mean ? storage.mean->view() : from.shared->static_part;
+  Result<StaticCodes> codes = encode_static_parts(to.static_part, parts);
+  if (!codes.ok()) return codes.status();
+  storage.statics = std::move(codes).value();
+  to.static_scale = storage.statics.scale;
+  to.static_frequency = storage.statics.frequency;
+  to.static_code = storage.statics.code;
+  to.static_code_end = storage.statics.code_end;
+  return {};
+}
+
 // ---- Provenance: what all members have is said once ---------------------------------------------
 
 // Removes from every member what all have, and returns that.
@@ -237,6 +279,10 @@ Status check(const NewPopulation& population) {
         StatusCode::kInvalidArgument,
         "population: levels " + std::to_string(population.levels) + " are none of 1 to 127");
   }
+  if ((population.coding == DifferenceCoding::kNone) != (population.shared != nullptr)) {
+    return Status(StatusCode::kInvalidArgument,
+                  "population: a shared avatar goes with members of one network");
+  }
   const Result<std::vector<ValueShape>> shapes = infer_shapes(population.initial, true);
   if (!shapes.ok())
     return Status(StatusCode::kInvalidArgument, "initial weights: " + shapes.status().message());
@@ -251,7 +297,9 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
   FIG_RETURN_IF_ERROR(check(from));
   const Avatar& first = *from.members.front().avatar;
   Population to;
-  to.kind() = first.kind();
+  to.kind() = (from.shared != nullptr ? *from.shared : first).kind();
+  to.uv_size = first.texels_a_side();
+  to.antialiased = first.antialiased;
   to.name = from.name;
   to.network = from.initial;
   to.coding = from.coding;
@@ -263,6 +311,7 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
     const Avatar& avatar = *member.avatar;
     PopulationMember& described = to.members.emplace_back();
     described.traits() = avatar.traits();
+    if (from.shared != nullptr) described.map_statistics = from.shared->map_statistics;
     described.golden = avatar.golden.without_picture();
     described.name = avatar.name;
     described.split = member.split;
@@ -270,10 +319,12 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
     append(storage.pose_mean, avatar.pose_statistics.mean);
     append(storage.golden_poses, avatar.golden.rotations);
     add_factor(avatar.pose_statistics.covariance, 3 * to.pose_joints.size(), storage.pose_factor);
-    for (const Layer& layer : avatar.network.layers) append(storage.bias, layer.bias);
+    if (from.coding != DifferenceCoding::kNone) {
+      for (const Layer& layer : avatar.network.layers) append(storage.bias, layer.bias);
+    }
     if (from.coding == DifferenceCoding::kInt8) {
       kernels.push_back(quantise(avatar, from.initial, from.levels, storage.scale));
-    } else {
+    } else if (from.coding == DifferenceCoding::kHalf) {
       FIG_RETURN_IF_ERROR(add_halves(member, from.initial, storage.difference));
     }
     own.push_back(*member.provenance);
@@ -281,6 +332,7 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
       return Status(StatusCode::kInterrupted, "population: interrupted, nothing was written");
   }
   if (from.coding == DifferenceCoding::kInt8) FIG_RETURN_IF_ERROR(encode(kernels, storage));
+  FIG_RETURN_IF_ERROR(take_static_parts(from, storage, to));
   take_quality(from, to);
   Provenance shared = factor_out(own);
   shared.settings.insert(shared.settings.end(), from.settings.begin(), from.settings.end());

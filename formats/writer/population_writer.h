@@ -16,7 +16,8 @@ inline constexpr uint32_t kMostLevels = 127;  // of either sign, beside zero
 
 struct NewMember {
   const Avatar* avatar =
-      nullptr;  // float weights; no picture and no hash of its golden frame is taken over
+      nullptr;  // float weights; no picture and no hash of its golden frame is taken over. Of kNone
+                // it may lack a network, which is the shared one's
   const Provenance* provenance = nullptr;  // quality included
   Split split = Split::kTrain;
 };
@@ -24,6 +25,9 @@ struct NewMember {
 struct NewPopulation {
   std::string name;
   Network initial;  // with weights
+  // Of kNone: whose kind, maps and mean map all members share; `initial` is its network. Null
+  // otherwise: then the mean map is that of the members.
+  const Avatar* shared = nullptr;
   DifferenceCoding coding = DifferenceCoding::kInt8;
   uint32_t levels =
       kMostLevels;  // of kInt8: fewer are coarser and take less, log2(127 / levels) bits a weight
@@ -35,8 +39,9 @@ struct NewPopulation {
 };
 
 // kMismatch "member 'NAME': ..." if a member has another network shape, body, template, number of
-// shape coefficients or of joints than the first, or is nothing but fixed point; kLimitExceeded if
-// a difference does not fit. The bytes are opened again before they are returned.
+// shape coefficients or of joints, or other static groups than the first, or is nothing but fixed
+// point; kLimitExceeded if a difference does not fit. The bytes are opened again before they are
+// returned.
 //
 //   kInt8: scale = max |w - w0| / levels over an output channel's kernel, q = round((w - w0) /
 //   scale), to nearest, ties to even

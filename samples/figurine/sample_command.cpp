@@ -265,7 +265,7 @@ Status run_sample(SampleOptions options) {
   };
   print_summary(options, from, **sampler,
                 {.name = avatar.name,
-                 .hash = hash_weights(avatar.fixed_point, avatar.shape),
+                 .hash = hash_weights(avatar.fixed_point, avatar.shape, avatar.static_part),
                  .size_bytes = bytes->size(),
                  .open_s = seconds(start_ns, loaded_ns),
                  .sample_s = seconds(loaded_ns, sampled_ns),

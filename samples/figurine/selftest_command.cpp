@@ -200,8 +200,9 @@ Status run_sampler_selftest(const Package& package, const std::string& path,
         (*device)
             ->sample({.seed = golden.seed, .steps = golden.steps, .method = golden.method}, person)
             .within(path));
+    const Avatar& avatar = person.avatar();
     const std::string here = format_hash(
-                          hash_weights(person.avatar().fixed_point, person.avatar().shape)),
+                          hash_weights(avatar.fixed_point, avatar.shape, avatar.static_part)),
                       there = format_hash(golden.hash);
     const std::string seed = std::format("seed {} in {} steps of {}", golden.seed, golden.steps,
                                          to_string(golden.method));

@@ -284,9 +284,12 @@ Json describe_population(const Package& package) {
   const Population& population = package.population();
   Json members = Json::array();
   for (size_t m = 0; m < population.size(); ++m) members.push_back(describe_member(package, m));
-  return describe_kind(population, {{"fourier_octaves", population.fourier_octaves},
+  return describe_kind(population, {{"uv_size", population.texels_a_side()},
+                                    {"fourier_octaves", population.fourier_octaves},
                                     {"network", describe_network(population.network)},
                                     {"coding", to_string(population.coding)},
+                                    {"static_part", describe_static_part(population.static_part)},
+                                    {"antialiased", population.antialiased},
                                     {"pose_statistics_joints", population.pose_joints},
                                     {"quality_names", population.quality_names},
                                     {"members", members}});
@@ -312,9 +315,14 @@ Json describe_space(const Sampler& sampler) {
     tokens.push_back({{"name", name}, {"values", sizes[token]}, {"rank", sampler.ranks[token]}});
   };
   for (size_t i = 0; i < sampler.network.layers.size(); ++i) {
-    if (sampler.network.layers[i].op == LayerOp::kConv2d) add(std::format("layer {}", i));
+    if (sampler.network.layers[i].op == LayerOp::kConv2d && !sampler.shares_network)
+      add(std::format("layer {}", i));
   }
   if (sampler.shape_count > 0) add("shape");
+  for (size_t g = 0; g < sampler.static_groups.size(); ++g) {
+    for (size_t p = 0; p < sampler.static_groups[g].patch_rows.size(); ++p)
+      add(std::format("static {} {}", g, p));
+  }
   return {{"values", sampler.mean.size()},
           {"directions", sampler.direction_scale.size()},
           {"bytes", sampler.mean.size_bytes() + sampler.directions.size_bytes() +
@@ -358,10 +366,27 @@ Json describe_report(std::string_view report) {
   return too_deep || parsed.is_discarded() ? Json(report) : parsed;
 }
 
+Json describe_static_groups(const Sampler& sampler) {
+  Json groups = Json::array();
+  for (const SampledStaticGroup& group : sampler.static_groups) {
+    groups.push_back({{"first_channel", group.first_channel},
+                      {"channels", group.channels},
+                      {"grid_size", group.grid_size},
+                      {"cells", group.row.size()},
+                      {"patches", group.patch_rows.size()},
+                      {"scale", numbers(group.scale)}});
+  }
+  return groups;
+}
+
 Json describe_sampler(const Sampler& sampler) {
   const NoiseScheduleOptions& noise = sampler.noise;
   return describe_kind(sampler,
                        {{"shape_coefficients", sampler.shape_count},
+                        {"uv_size", sampler.texels_a_side()},
+                        {"shares_network", sampler.shares_network},
+                        {"static_groups", describe_static_groups(sampler)},
+                        {"antialiased", sampler.antialiased},
                         {"fourier_octaves", sampler.fourier_octaves},
                         {"map_mean", numbers(sampler.map_statistics.mean)},
                         {"map_scale", numbers(sampler.map_statistics.scale)},

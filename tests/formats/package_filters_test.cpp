@@ -139,14 +139,17 @@ TEST(PackageFilters, AReaderOfBeforeRefusesThem) {
                  "required_features", StatusCode::kUnsupported);
 }
 
-TEST(PackageFilters, PopulationsHoldNone) {
+TEST(PackageFilters, APopulationsMembersHaveNoExtentsAndAreAntialiasedAllOrNone) {
   samples::PopulationSample sample;
   sample.avatars[1]->avatar.antialiased = true;
-  expect_refused(sample.write().status(), "a population does not hold that", StatusCode::kMismatch);
-  sample.avatars[1]->avatar.antialiased = false;
+  expect_refused(sample.write().status(), "is drawn otherwise", StatusCode::kMismatch);
+  for (const auto& avatar : sample.avatars) avatar->avatar.antialiased = true;
+  const Opened all = open_or_die(sample.write());
+  EXPECT_EQ(all.package.required_features(), kFeatureFilters);
+  EXPECT_TRUE(all.package.population().antialiased);
   const std::vector<uint8_t> codes(5, 9);
   sample.avatars[1]->avatar.smallest_extents = {.scale_m = 1e-4f, .codes = codes};
-  expect_refused(sample.write().status(), "a population does not hold that", StatusCode::kMismatch);
+  expect_refused(sample.write().status(), "a population does not hold them", StatusCode::kMismatch);
 }
 
 TEST(PackageFilters, FitTheBodyWhoseTexelsTheyAre) {

@@ -251,12 +251,54 @@ PopulationSample::PopulationSample(DifferenceCoding coding)
     population.members.push_back({&avatars[m]->avatar, &provenance[m], static_cast<Split>(m)});
 }
 
+StaticPopulationSample::StaticPopulationSample(DifferenceCoding coding)
+    : initial(std::make_unique<StaticAvatarSample>()) {
+  const bool alike = coding == DifferenceCoding::kNone;
+  initial->avatar.name = "shared";
+  initial->avatar.antialiased = true;
+  for (size_t m = 0; m < 3; ++m) {
+    StaticAvatarSample& sample = *avatars.emplace_back(std::make_unique<StaticAvatarSample>());
+    sample.avatar.name = "person " + std::to_string(m);
+    sample.avatar.antialiased = true;
+    sample.shape[0] += static_cast<float>(m);
+    // Some differ by more than half of the range, so that the difference wraps.
+    for (size_t k = 0; k < sample.geometry.size(); ++k) {
+      sample.geometry[k] =
+          static_cast<int8_t>((sample.geometry[k] + 127 + int(m * k * 11)) % 255 - 127);
+    }
+    for (size_t k = 0; k < sample.colour.size(); ++k)
+      sample.colour[k] = static_cast<int8_t>(int(k + m) % 2 == 0 ? -127 : 127);
+    sample.geometry_scale[2] *= static_cast<float>(1 + m);
+    if (alike && m == 2) {
+      sample.avatar.network = {};
+      sample.avatar.fourier_octaves = 0;
+    } else if (!alike) {
+      for (std::vector<float>& weights : sample.weights) {
+        for (size_t k = 0; k < weights.size(); ++k)
+          weights[k] += 0x1p-10f * static_cast<float>(k % 7 * m);
+      }
+    }
+    Provenance& own = provenance.emplace_back(make_provenance());
+    own.quality = {{"psnr_pose_db", 27.5 + static_cast<double>(m)}};
+  }
+  population = {.name = "sample population with static parts",
+                .initial = initial->avatar.network,
+                .shared = alike ? &initial->avatar : nullptr,
+                .coding = coding,
+                .members = {},
+                .budget = initial->budget};
+  for (size_t m = 0; m < 3; ++m)
+    population.members.push_back({&avatars[m]->avatar, &provenance[m], static_cast<Split>(m)});
+}
+
 std::string to_string(SampleKind kind) {
   if (kind == SampleKind::kFixedPointAvatar) return "fixed_point_avatar";
   if (kind == SampleKind::kHalfPopulation) return "half_population";
   if (kind == SampleKind::kStaticAvatar) return "static_avatar";
   if (kind == SampleKind::kStaticOnlyAvatar) return "static_only_avatar";
   if (kind == SampleKind::kFilteredAvatar) return "filtered_avatar";
+  if (kind == SampleKind::kStaticPopulation) return "static_population";
+  if (kind == SampleKind::kStaticSampler) return "static_sampler";
   return figurine::to_string(package_kind(kind));
 }
 
@@ -274,8 +316,10 @@ PackageKind package_kind(SampleKind kind) {
       return PackageKind::kMotion;
     case SampleKind::kPopulation:
     case SampleKind::kHalfPopulation:
+    case SampleKind::kStaticPopulation:
       return PackageKind::kPopulation;
     case SampleKind::kSampler:
+    case SampleKind::kStaticSampler:
       return PackageKind::kSampler;
   }
   return {};
@@ -295,8 +339,12 @@ Result<std::vector<std::byte>> write_sample(SampleKind kind) {
       return PopulationSample(DifferenceCoding::kInt8).write();
     case SampleKind::kHalfPopulation:
       return PopulationSample(DifferenceCoding::kHalf).write();
+    case SampleKind::kStaticPopulation:
+      return StaticPopulationSample().write();
     case SampleKind::kSampler:
       return SamplerSample().write();
+    case SampleKind::kStaticSampler:
+      return StaticSamplerSample().write();
     case SampleKind::kStaticAvatar:
       return StaticAvatarSample().write();
     case SampleKind::kStaticOnlyAvatar:
@@ -392,6 +440,56 @@ MotionSample::MotionSample() {
             .frame_count = 3,
             .root_translation_m = root_translation,
             .rotations = rotations};
+}
+
+StaticSamplerSample::StaticSamplerSample() : geometry_row{1, 0}, colour_row{4, 0, 3, 1, 2} {
+  network.with_floats();
+  sampler.name = "sample sampler of static parts";
+  sampler.network = network.avatar.network;
+  sampler.fixed_point = network.avatar.fixed_point;
+  sampler.shares_network = true;
+  sampler.uv_size = 8;
+  sampler.antialiased = true;
+  for (uint32_t c = 0; c < kStaticColour; ++c)
+    geometry_scale.push_back(0.00390625f * static_cast<float>(c + 1));
+  colour_scale = {0.0078125f, 0.015625f, 0.00390625f};
+  sampler.static_groups = {{0, kStaticColour, 2, geometry_scale, geometry_row, {1, 1}},
+                           {kStaticColour, 3, 8, colour_scale, colour_row, {3, 2}}};
+  fill_space();
+}
+
+void StaticSamplerSample::fill_space() {
+  const std::vector<size_t> tokens = sampler_token_sizes(sampler);
+  sampler.ranks.clear();
+  for (std::vector<float>* values : {&mean, &direction_scale, &row_scale, &bias, &position})
+    values->clear();
+  directions.clear(), matrices.clear();
+  for (size_t token = 0; token < tokens.size(); ++token) {
+    const auto rank = static_cast<uint32_t>(token % 2 + 1);
+    sampler.ranks.push_back(rank);
+    for (size_t k = 0; k < rank * tokens[token]; ++k)
+      directions.push_back(static_cast<int8_t>(int(k * 29 + token) % 255 - 127));
+    for (uint32_t k = 0; k < rank; ++k)
+      direction_scale.push_back(0x1p-10f * static_cast<float>(token + 1));
+    for (size_t i = 0; i < tokens[token]; ++i) mean.push_back(pattern(i + token));
+  }
+  size_t rows = 0;
+  for (const MatrixShape& matrix : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
+    for (size_t k = 0; k < size_t{matrix.rows} * matrix.columns; ++k)
+      matrices.push_back(static_cast<int8_t>(int(k * 53 + rows) % 255 - 127));
+    rows += matrix.rows;
+  }
+  for (size_t n = 0; n < rows; ++n) row_scale.push_back(0x1p-10f * static_cast<float>(n % 3 + 1));
+  bias = patterned(rows);
+  position = patterned((tokens.size() + 1) * sampler.denoiser.d_model);
+  sampler.mean = mean;
+  sampler.directions = directions;
+  sampler.direction_scale = direction_scale;
+  sampler.matrices = matrices;
+  sampler.row_scale = row_scale;
+  sampler.bias = bias;
+  sampler.position = position;
+  sampler.noise.dimension = direction_scale.size();
 }
 
 }  // namespace figurine::samples

@@ -95,6 +95,19 @@ struct PopulationSample {
   Result<std::vector<std::byte>> write() const { return write_population(population); }
 };
 
+// Three avatars with static parts, each a little different from the others', antialiased. Of kNone
+// all have the network of `initial`, the shared one, and the third has no copy of it.
+struct StaticPopulationSample {
+  explicit StaticPopulationSample(DifferenceCoding coding = DifferenceCoding::kNone);
+  StaticPopulationSample(const StaticPopulationSample&) = delete;
+  std::unique_ptr<StaticAvatarSample> initial;
+  std::vector<std::unique_ptr<StaticAvatarSample>> avatars;  // [3]
+  std::vector<Provenance> provenance;                        // [3]
+  NewPopulation population;
+
+  Result<std::vector<std::byte>> write() const { return write_population(population); }
+};
+
 struct MotionSample {
   MotionSample();
   MotionSample(const MotionSample&) = delete;
@@ -120,6 +133,18 @@ struct SamplerSample {
   }
 };
 
+// Samples the static parts of avatars of one network, antialiased: a token of the shape, four of
+// patches of two groups.
+struct StaticSamplerSample : SamplerSample {
+  StaticSamplerSample();
+  FixedPointAvatarSample network;
+  std::vector<float> geometry_scale, colour_scale;  // [11], [3]
+  std::vector<uint32_t> geometry_row, colour_row;   // [2], [5]
+
+ private:
+  void fill_space();
+};
+
 // One of each, for tests of what all packages have in common.
 enum class SampleKind {
   kBody,
@@ -131,13 +156,15 @@ enum class SampleKind {
   kSampler,
   kStaticAvatar,
   kStaticOnlyAvatar,
-  kFilteredAvatar
+  kFilteredAvatar,
+  kStaticPopulation,
+  kStaticSampler
 };
 inline constexpr SampleKind kSampleKinds[] = {
-    SampleKind::kBody,          SampleKind::kAvatar,       SampleKind::kFixedPointAvatar,
-    SampleKind::kMotion,        SampleKind::kPopulation,   SampleKind::kHalfPopulation,
-    SampleKind::kSampler,       SampleKind::kStaticAvatar, SampleKind::kStaticOnlyAvatar,
-    SampleKind::kFilteredAvatar};
+    SampleKind::kBody,           SampleKind::kAvatar,           SampleKind::kFixedPointAvatar,
+    SampleKind::kMotion,         SampleKind::kPopulation,       SampleKind::kHalfPopulation,
+    SampleKind::kSampler,        SampleKind::kStaticAvatar,     SampleKind::kStaticOnlyAvatar,
+    SampleKind::kFilteredAvatar, SampleKind::kStaticPopulation, SampleKind::kStaticSampler};
 std::string to_string(SampleKind kind);  // also the name of its golden file: "fixed_point_avatar"
 PackageKind package_kind(SampleKind kind);
 Result<std::vector<std::byte>> write_sample(SampleKind kind);

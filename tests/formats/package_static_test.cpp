@@ -233,15 +233,15 @@ TEST(PackageStatic, TheHeaderPromisesWhatIsThere) {
                  "the bit of static parts is set, such an avatar is not there");
 }
 
-TEST(PackageStatic, PopulationsHoldNone) {
+TEST(PackageStatic, APopulationsMembersHaveTheSameGroupsAndTexels) {
   samples::PopulationSample sample;
   const StaticAvatarSample with;
   sample.avatars[1]->avatar.static_part = with.avatar.static_part;
-  expect_refused(sample.write().status(), "has a static part", StatusCode::kMismatch);
+  expect_refused(sample.write().status(), "its static part has other groups",
+                 StatusCode::kMismatch);
   sample.avatars[1]->avatar.static_part = {};
   sample.avatars[1]->avatar.uv_size = 16;
-  expect_refused(sample.write().status(), "a network coarser than its texels",
-                 StatusCode::kMismatch);
+  expect_refused(sample.write().status(), "is drawn otherwise", StatusCode::kMismatch);
   sample.avatars[1]->avatar.uv_size = 8;
   EXPECT_TRUE(sample.write().ok());
 }

@@ -577,8 +577,10 @@ TEST(PackagePopulation, RejectsSharedFieldsThatCannotBe) {
                  "maps and Fourier channels make 14");
   expect_refused(with_index([](Population& p) { p.template_mode = static_cast<TemplateMode>(2); }),
                  "population.template_mode", StatusCode::kUnsupported);
-  expect_refused(with_index([](Population& p) { p.coding = static_cast<DifferenceCoding>(2); }),
+  expect_refused(with_index([](Population& p) { p.coding = static_cast<DifferenceCoding>(3); }),
                  "population.coding", StatusCode::kUnsupported);
+  expect_refused(with_index([](Population& p) { p.coding = DifferenceCoding::kNone; }),
+                 "population.coding: says that nobody differs");
   expect_refused(with_index([](Population& p) { p.coding = DifferenceCoding::kHalf; }),
                  "population.difference: is missing");
   expect_refused(with_index([](Population& p) { p.pose_joints = {2, 2}; }),

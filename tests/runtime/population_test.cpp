@@ -100,6 +100,43 @@ TEST(PopulationMember, RendersWhatAnAvatarPackageOfTheSameWeightsRenders) {
   }
 }
 
+// A member is its map; the network, at half the texels' side, is everybody's.
+TEST(PopulationMember, OfOneNetworkRendersItsMapOverThatNetwork) {
+  const SyntheticBody body = make_test_body();
+  const auto make = [&](uint64_t seed) {
+    return make_test_avatar(body, {.seed = seed,
+                                   .network_step = 2,
+                                   .static_part = true,
+                                   .name = "person " + std::to_string(seed)});
+  };
+  const SyntheticAvatar shared = make(1), first = make(2), second = make(3);
+  const Avatar& network = shared.package->avatar();
+  std::vector<Avatar> people;
+  NewPopulation made{.name = "people",
+                     .initial = network.network,
+                     .shared = &network,
+                     .coding = DifferenceCoding::kNone};
+  for (const SyntheticAvatar* person : {&first, &second}) {
+    Avatar& avatar = people.emplace_back(person->package->avatar());
+    avatar.network = network.network;
+  }
+  for (const Avatar& avatar : people)
+    made.members.push_back({&avatar, &shared.package->provenance(), Split::kTrain});
+  const Result<std::vector<std::byte>> written = write_population(made);
+  ASSERT_TRUE(written.ok()) << written.status().message();
+  const tests::AlignedBytes bytes(*written);
+  const Result<Package> package = Package::open(bytes.bytes(), "people");
+  ASSERT_TRUE(package.ok()) << package.status().message();
+  std::vector<float> storage(member_floats(package->population()));
+  std::vector<float> before;
+  for (size_t m = 0; m < 2; ++m) {
+    const std::vector<float> picture = draw(body, {open_member(package->population(), m, storage)});
+    EXPECT_TRUE(same(picture, draw(body, {people[m]})));
+    EXPECT_FALSE(same(picture, before));
+    before = picture;
+  }
+}
+
 TEST(PopulationMember, SeveralStandInOneFrame) {
   People people(DifferenceCoding::kInt8);
   const std::vector<Avatar> all = {people.member(0), people.member(1), people.member(2)};

@@ -22,15 +22,15 @@ struct BasisArguments {
 void add_basis_command(CLI::App& app) {
   auto arguments = std::make_shared<BasisArguments>();
   CLI::App* command = app.add_subcommand(
-      "basis", "Find the directions that people's kernels differ by from a shared network, for "
-               "avatar --network-adapter basis");
+      "basis",
+      "Find the directions that people's kernels differ by from a shared network, for "
+      "avatar --network-adapter basis");
   command
       ->add_option("--shared", arguments->shared,
                    "Run whose network all of the others began with (avatar --init)")
       ->required();
   command->add_option("RUN", arguments->runs, "Runs of people, or weights files")->required();
-  command
-      ->add_option("--rank", arguments->rank, "Directions of a kernel, at most (default 8)")
+  command->add_option("--rank", arguments->rank, "Directions of a kernel, at most (default 8)")
       ->check(CLI::Range(1, 256));
   command->add_option("-o,--output", arguments->path, "File (.safetensors)")->required();
   command->callback([arguments] {
@@ -38,10 +38,11 @@ void add_basis_command(CLI::App& app) {
         arguments->shared, arguments->runs, arguments->rank, arguments->path);
     double sum = 0, least = 1;
     for (const double share : report.energy) sum += share, least = std::min(least, share);
-    std::printf("%s: %zu people; %u directions a kernel hold %.1f %% of the differences in the "
-                "mean, %.1f %% in the worst layer\n",
-                arguments->path.c_str(), report.people, arguments->rank,
-                100 * sum / static_cast<double>(report.energy.size()), 100 * least);
+    std::printf(
+        "%s: %zu people; %u directions a kernel hold %.1f %% of the differences in the "
+        "mean, %.1f %% in the worst layer\n",
+        arguments->path.c_str(), report.people, arguments->rank,
+        100 * sum / static_cast<double>(report.energy.size()), 100 * least);
   });
 }
 

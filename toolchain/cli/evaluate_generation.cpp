@@ -234,7 +234,7 @@ class Samplers {
   void draw_run(const std::string& text, const members::MemberSet& set, size_t count) {
     const auto [name, path] = named_path(text);
     const generate::TrainedSampler sampler =
-        generate::TrainedSampler::open(path, arguments_.population);
+        generate::TrainedSampler::open(path, arguments_.population, arguments_.body);
     verify::DrawOptions draw = arguments_.draw;
     draw.count = count;
     const double start = now_s();
@@ -321,7 +321,7 @@ struct SamplingArguments {
 void run_sampling(const SamplingArguments& arguments) {
   model::use_threads(arguments.threads);
   const generate::TrainedSampler trained =
-      generate::TrainedSampler::open(arguments.run, arguments.population);
+      generate::TrainedSampler::open(arguments.run, arguments.population, arguments.body);
   const train::PackageFile sampler = train::open_package(arguments.sampler, PackageKind::kSampler);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   nlohmann::json report = head();

@@ -28,7 +28,7 @@ struct PackArguments {
   train::OpenRunOptions open;
   train::PackOptions pack;
   std::vector<std::string> inputs;
-  bool is_population = false;
+  bool is_population = false, no_network = false;
   train::PackPopulationOptions population;
   std::string precision, output;
   bool fine_tune = false;
@@ -109,6 +109,14 @@ void run_avatar(PackArguments arguments) {
     throw InputError("--qat: is for --precision q8");
   }
   const train::RunDirectory folder{arguments.open.run};
+  if (arguments.no_network) {
+    arguments.pack.network = false;
+    const std::vector<std::byte> bytes = train::pack_avatar(avatar, folder, arguments.pack);
+    throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
+    std::printf("%s: %zu bytes, for a population that has the network\n", arguments.output.c_str(),
+                bytes.size());
+    return;
+  }
   // Written twice: the first copy runs on the device's renderer, which then says how much memory it
   // held and what it drew.
   train::PackOptions options = arguments.pack;
@@ -189,6 +197,19 @@ void add_pack_command(CLI::App& app) {
           "--init", arguments->population.init,
           "Weights or run that all members started from (default: the common initial weights)")
       ->needs(population);
+  command
+      ->add_option("--shared", arguments->population.shared,
+                   "Avatar package whose network all members have; they may be packages without "
+                   "one (pack --no-network)")
+      ->needs(population)
+      ->excludes("--init")
+      ->excludes("--precision");
+  command
+      ->add_flag("--no-network", arguments->no_network,
+                 "Leave out the network, which the avatar has from another training (avatar "
+                 "--freeze-network): what a population with --shared takes")
+      ->excludes(population)
+      ->excludes("--precision");
   command
       ->add_option("--levels", arguments->population.levels,
                    "Of a population's differences in q8, of either sign (default 127); fewer are "

@@ -60,6 +60,9 @@ void add_sampler_command(CLI::App& app) {
       ->add_option("--population", request.population,
                    "Package to learn from: its training part alone")
       ->required();
+  command->add_option("--body", request.body,
+                      "Package that the population stands on: needed where members have static "
+                      "parts");
   command->add_option("-o,--output", request.run, "Folder of the run")->required();
   command
       ->add_option("--variant", arguments->variant,

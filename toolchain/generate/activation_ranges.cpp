@@ -4,6 +4,7 @@
 #include "toolchain/error.h"
 #include "toolchain/model/unet.h"
 #include "toolchain/tensor_operations.h"
+#include "toolchain/train/grid_body.h"
 #include "toolchain/train/opened_member.h"
 #include "toolchain/train/progress.h"
 
@@ -14,14 +15,15 @@ namespace {
 // [T,T,Cin] standardised maps, Fourier channels behind them. All members share how their maps are
 // standardised.
 torch::Tensor network_input(const Population& population, const Body& body, const PoseView& pose) {
-  const uint32_t size = body.uv_size, channels = population.network.input_channels;
+  const uint32_t size = population.network.input_size, channels = population.network.input_channels;
+  const train::GridBody grid(body, size);
   torch::Tensor input = torch::zeros({size, size, channels});
   const std::span<float> values{input.data_ptr<float>(), static_cast<size_t>(input.numel())};
   if (population.fourier_octaves > 0)
     draw_fourier_channels(size, population.fourier_octaves, kMapChannels, channels, values);
   std::vector<Affine> world_from_rest(body.joint_count());
-  draw_pose_maps(body, pose, population.members.front().map_statistics, world_from_rest, channels,
-                 values);
+  draw_pose_maps(grid.view(), pose, population.members.front().map_statistics, world_from_rest,
+                 channels, values);
   return input;
 }
 
@@ -49,6 +51,7 @@ ActivationRanges observe_training_members(const Population& population, const Pa
   train::Progress progress("ranges", quiet);
   for (size_t m = 0; m < population.size(); ++m) {
     if (population.members[m].split != Split::kTrain) continue;
+    if (ranges.members > 0 && population.coding == DifferenceCoding::kNone) break;  // all alike
     progress.show(static_cast<double>(m) / static_cast<double>(population.size()),
                   "member " + population.members[m].name);
     const train::OpenedMember member(population, m);

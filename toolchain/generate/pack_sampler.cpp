@@ -63,7 +63,8 @@ std::vector<std::byte> pack_sampler(const PackSamplerOptions& options) {
         ": say --body: the activation ranges are found by posing the population's members");
   }
   model::use_threads(options.threads);
-  const TrainedSampler trained = TrainedSampler::open(options.run, options.population);
+  const TrainedSampler trained =
+      TrainedSampler::open(options.run, options.population, options.body);
   const Population& population = trained.population->package.population();
   const train::PackageFile body = train::open_package(options.body, PackageKind::kBody);
   const ActivationRanges ranges = observe_training_members(

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "figurine/detail/fixed_point_weights.h"
 #include "toolchain/error.h"
 #include "toolchain/tensor_operations.h"
+#include "toolchain/train/opened_member.h"
 
 namespace figurine::generate {
 
@@ -76,6 +78,8 @@ QuantisedSampler::QuantisedSampler(const TrainedSampler& trained, std::vector<Qu
   sampler_.population_hash = trained.population->package.content_hash();
   sampler_.values = std::move(ranges);
   take_what_members_share(population);
+  take_network(population);
+  take_static_groups(trained, population);
   quantise_space(trained);
   quantise_transformer(trained);
   sampler_.noise = {.dimension = trained.space->dimension(),
@@ -96,12 +100,56 @@ void QuantisedSampler::take_what_members_share(const Population& population) {
     }
   }
   sampler_.kind() = population.kind();
-  for (Layer& layer : sampler_.network.layers) layer.weights = layer.bias = {};
+  sampler_.uv_size = population.uv_size;
+  sampler_.antialiased = population.antialiased;
   sampler_.shape_count = static_cast<uint32_t>(population.shape.size() / population.size());
   sampler_.traits() = first->traits();  // a member's golden frame has no picture
   if (population.pose_joints.empty()) return;
   pooled_pose_statistics(population, pose_mean_, pose_covariance_);
   sampler_.pose_statistics = {population.pose_joints, pose_mean_, pose_covariance_};
+}
+
+// Everybody's network goes with the sampler, in floats and by the ranges in fixed point.
+void QuantisedSampler::take_network(const Population& population) {
+  sampler_.shares_network = population.coding == DifferenceCoding::kNone;
+  if (!sampler_.shares_network) {
+    for (Layer& layer : sampler_.network.layers) layer.weights = layer.bias = {};
+    return;
+  }
+  throw_if_error(fixed_point_.quantise(population.network, sampler_.values),
+                 "population '" + population.name + "'");
+  sampler_.fixed_point = fixed_point_.view();
+}
+
+// A channel's integers reach as far as the farthest training member.
+void QuantisedSampler::take_static_groups(const TrainedSampler& trained,
+                                          const Population& population) {
+  const std::vector<StaticGroup>& groups = population.static_part.groups;
+  for (const StaticGroup& group : groups)
+    static_scale_.emplace_back(group.channels, std::numeric_limits<float>::min());
+  for (size_t m = 0; m < population.size(); ++m) {
+    if (population.members[m].split != Split::kTrain) continue;
+    const train::OpenedMember member(population, m);
+    for (size_t g = 0; g < groups.size(); ++g) {
+      const StaticGroup& own = member.avatar.static_part.groups[g];
+      for (size_t i = 0; i < own.values.size(); ++i) {
+        const size_t c = i % own.channels;
+        const float value = std::abs(own.scale[c] * static_cast<float>(own.values[i]));
+        static_scale_[g][c] = std::max(static_scale_[g][c], value / 127);
+      }
+    }
+  }
+  for (size_t g = 0; g < groups.size(); ++g) {
+    const measure::WeightLayout::Patches& patches = trained.layout->patches()[g];
+    static_row_.push_back(patches.row);
+    sampler_.static_groups.push_back({.first_channel = groups[g].first_channel,
+                                      .channels = groups[g].channels,
+                                      .grid_size = groups[g].grid_size,
+                                      .scale = static_scale_[g],
+                                      .row = {},
+                                      .patch_rows = patches.patch_rows});
+  }
+  for (size_t g = 0; g < groups.size(); ++g) sampler_.static_groups[g].row = static_row_[g];
 }
 
 void QuantisedSampler::quantise_space(const TrainedSampler& trained) {

@@ -7,12 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "figurine/detail/fixed_point_weights.h"
 #include "figurine/sampler.h"
 #include "toolchain/generate/sampler_trainer.h"
 
 namespace figurine::generate {
 
-// Owns what `view` borrows, but for the golden pose, which is the population's.
+// Owns what `view` borrows, but for the golden pose and a network that all avatars share, which are
+// the population's.
 class QuantisedSampler {
  public:
   // ranges: of the avatars' values (activation_ranges.h). Throws InputError if the sampler is of
@@ -28,6 +30,8 @@ class QuantisedSampler {
 
  private:
   void take_what_members_share(const Population& population);
+  void take_network(const Population& population);
+  void take_static_groups(const TrainedSampler& trained, const Population& population);
   void quantise_space(const TrainedSampler& trained);
   void quantise_transformer(const TrainedSampler& trained);
 
@@ -35,6 +39,9 @@ class QuantisedSampler {
   std::vector<float> mean_, direction_scale_, row_scale_, bias_, position_, norm_, pose_mean_,
       pose_covariance_;
   std::vector<int8_t> directions_, matrices_;
+  FixedPointStorage fixed_point_;                 // of the network that all avatars share
+  std::vector<std::vector<float>> static_scale_;  // [groups]
+  std::vector<std::vector<uint32_t>> static_row_;
 };
 
 // Mean and covariance of all training members' poses together, from each member's own: the law of

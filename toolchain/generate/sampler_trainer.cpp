@@ -140,16 +140,31 @@ nlohmann::json describe(const SamplerRequest& request, const SamplerSettings& se
           {"population",
            {{"path", request.population},
             {"name", population.package.population().name},
-            {"hash", format_hash(population.package.content_hash())}}}};
+            {"hash", format_hash(population.package.content_hash())}}},
+          {"body", request.body}};
 }
 
 struct Members {
   RowMatrix training, validation;  // [N,W]
 };
 
-Members members_of(const Population& population, const SamplerSettings& settings,
-                   const std::string& path) {
-  const RowMatrix weights = measure::read_weights(population);
+// body: a path; not looked at where no member has a static part.
+measure::WeightLayout layout_of(const Population& population, const std::string& path,
+                                const std::string& body) {
+  if (population.static_part.empty())
+    return {population.network, population.shape.size() / population.size()};
+  if (body.empty()) throw InputError(path + ": its members have static parts: say --body");
+  const train::PackageFile opened = train::open_package(body, PackageKind::kBody);
+  if (opened.package.content_hash() != population.body_hash) {
+    throw InputError(body + ": is " + format_hash(opened.package.content_hash()) + ", " + path +
+                     " stands on " + format_hash(population.body_hash));
+  }
+  return {population, opened.package.body()};
+}
+
+Members members_of(const Population& population, const measure::WeightLayout& layout,
+                   const SamplerSettings& settings, const std::string& path) {
+  const RowMatrix weights = layout.read(population);
   Members members{rows_of(population, weights, Split::kTrain, settings.members),
                   rows_of(population, weights, Split::kValidation)};
   if (members.training.rows() < 2) throw InputError(path + ": has fewer than two training members");
@@ -158,10 +173,6 @@ Members members_of(const Population& population, const SamplerSettings& settings
                      " training members, " + std::to_string(settings.members) + " were asked for");
   }
   return members;
-}
-
-std::vector<measure::Token> tokens_of(const Population& population) {
-  return measure::weight_tokens(population.network, population.shape.size() / population.size());
 }
 
 nlohmann::json read_run(const train::RunDirectory& run) {
@@ -401,8 +412,13 @@ SamplerResult train_sampler(const SamplerRequest& request) {
   if (plan.finished)
     return group.leads() ? result_of(plan.description) : SamplerResult{.was_finished = true};
   SamplerSettings& settings = plan.settings;
-  const Members members = members_of(population.package.population(), settings, request.population);
-  const std::vector<measure::Token> tokens = tokens_of(population.package.population());
+  const measure::WeightLayout layout = layout_of(
+      population.package.population(), request.population,
+      request.body.empty() && !plan.description.empty() ? plan.description.value("body", "")
+                                                        : request.body);
+  const Members members =
+      members_of(population.package.population(), layout, settings, request.population);
+  const std::vector<measure::Token>& tokens = layout.tokens();
   model::use_threads(settings.threads);
 
   // What can be wrong is found before anything is written: the tokens of `latent` are known before
@@ -458,7 +474,8 @@ SamplerResult train_sampler(const SamplerRequest& request) {
           .weights_hash = hash_bits(denoising.weights())};
 }
 
-TrainedSampler TrainedSampler::open(const std::string& path, const std::string& population) {
+TrainedSampler TrainedSampler::open(const std::string& path, const std::string& population,
+                                    const std::string& body) {
   const train::RunDirectory run{path};
   const nlohmann::json description = read_run(run);
   TrainedSampler sampler;
@@ -469,7 +486,9 @@ TrainedSampler TrainedSampler::open(const std::string& path, const std::string& 
       std::make_unique<train::PackageFile>(train::open_package(where, PackageKind::kPopulation));
   check_population(description, *sampler.population, run, where);
   const Population& people = sampler.population->package.population();
-  const Members members = members_of(people, sampler.settings, where);
+  sampler.layout = std::make_unique<measure::WeightLayout>(
+      layout_of(people, where, body.empty() ? description.value("body", "") : body));
+  const Members members = members_of(people, *sampler.layout, sampler.settings, where);
   std::shared_ptr<Autoencoder> autoencoder;
   if (sampler.settings.space.variant == Variant::kLatent) {
     autoencoder =
@@ -479,7 +498,7 @@ TrainedSampler TrainedSampler::open(const std::string& path, const std::string& 
                     autoencoder->parameters().weights());
   }
   sampler.space = std::make_unique<ModelSpace>(
-      make_space(members, tokens_of(people), sampler.settings, autoencoder));
+      make_space(members, sampler.layout->tokens(), sampler.settings, autoencoder));
   sampler.training = sampler.space->encode(members.training);
   sampler.transformer =
       std::make_unique<Transformer>(sampler.settings.shape, sampler.settings.seed);

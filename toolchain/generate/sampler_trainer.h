@@ -36,6 +36,8 @@ namespace figurine::generate {
 
 struct SamplerRequest {
   std::string population;  // package
+  std::string body;        // package that it stands on; needed where members have static parts,
+                           // whose patches are the body's
   std::string run;         // folder to write
   SamplerSettings settings;
   std::string command;  // as typed, for run.json
@@ -76,12 +78,14 @@ bool is_sampler_run(const std::string& path);
 struct TrainedSampler {
   std::unique_ptr<train::PackageFile> population;
   SamplerSettings settings;
+  std::unique_ptr<measure::WeightLayout> layout;
   std::unique_ptr<ModelSpace> space;
   measure::RowMatrix training;  // [N,D] model vectors
   std::unique_ptr<Transformer> transformer;
 
-  // population: where it is now; empty: where the run found it.
-  static TrainedSampler open(const std::string& run, const std::string& population = {});
+  // population, body: where they are now; empty: where the run found them.
+  static TrainedSampler open(const std::string& run, const std::string& population = {},
+                             const std::string& body = {});
 };
 
 }  // namespace figurine::generate

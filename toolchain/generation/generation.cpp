@@ -35,7 +35,7 @@ using measure::RowVector;
 using measure::SquaredError;
 using measure::Token;
 using measure::union_error;
-using measure::with_weights;
+using measure::WeightStorage;
 using members::kComparedShots;
 using members::MemberSet;
 using train::OpenedMember;
@@ -50,8 +50,8 @@ constexpr size_t kNoisedTried = 12;  // members that the level of noise is match
 std::vector<Picture> draw_row(const MemberSet& set, const RowVector& z) {
   const OpenedMember like(set.population(), set.training.front());
   const RowVector weights = set.standardisation.restore(z);
-  std::vector<float> storage(static_cast<size_t>(weights.size()));
-  return set.draw(with_weights(like.avatar, {weights.data(), storage.size()}, storage));
+  WeightStorage storage;
+  return set.draw(set.layout.with(like.avatar, {weights.data(), size_t(weights.size())}, storage));
 }
 
 People draw_rows(const MemberSet& set, const std::string& name, const RowMatrix& z) {

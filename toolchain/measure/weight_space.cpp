@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "figurine/check.h"
+#include "figurine/texel_grid.h"
 
 namespace figurine::measure {
 
 namespace {
 
+constexpr uint32_t kPatchesASide = 8, kSmallestPatch = 4;  // cells a side
 constexpr double kRounding =
     1e-10;  // of the largest variance: a Gram matrix of a few hundred rows in double leaves 1e-14
 
@@ -26,59 +29,171 @@ bool is_shared(const RowMatrix& training, Eigen::Index d) {
 
 }  // namespace
 
-std::vector<Token> weight_tokens(const Network& network, size_t shape_coefficients) {
-  std::vector<Token> tokens;
-  size_t begin = 0;
-  const auto add = [&](const std::string& name, size_t size) {
-    tokens.push_back({name, begin, size});
-    begin += size;
-  };
+namespace {
+
+// Squares of cells, row by row; those without a covered cell are none. names: "V.U" of each.
+WeightLayout::Patches cut_into_patches(const TexelGrid& grid, std::vector<std::string>& names) {
+  const uint32_t side = std::max(kSmallestPatch, grid.size / kPatchesASide),
+                 across = (grid.size + side - 1) / side;
+  std::vector<std::vector<uint32_t>> rows(size_t{across} * across);
+  for (uint32_t row = 0; row < grid.cell_count(); ++row) {
+    const uint32_t v = grid.cell[row] / grid.size, u = grid.cell[row] % grid.size;
+    rows[size_t{v / side} * across + u / side].push_back(row);
+  }
+  WeightLayout::Patches patches;
+  for (size_t p = 0; p < rows.size(); ++p) {
+    if (rows[p].empty()) continue;
+    patches.row.insert(patches.row.end(), rows[p].begin(), rows[p].end());
+    patches.patch_rows.push_back(static_cast<uint32_t>(rows[p].size()));
+    names.push_back(std::to_string(p / across) + "." + std::to_string(p % across));
+  }
+  return patches;
+}
+
+}  // namespace
+
+WeightLayout::WeightLayout(const Network& network, size_t shape_coefficients) {
+  add_network(network);
+  if (shape_coefficients > 0) add("shape", shape_coefficients);
+  network_size_ = size_;
+}
+
+WeightLayout::WeightLayout(const Population& population, const Body& body)
+    : own_network_(population.coding != DifferenceCoding::kNone) {
+  if (own_network_) add_network(population.network);
+  const size_t shape = population.shape.size() / population.size();
+  if (shape > 0) add("shape", shape);
+  network_size_ = size_;
+  for (size_t g = 0; g < population.static_part.groups.size(); ++g) {
+    const StaticGroup& group = population.static_part.groups[g];
+    std::vector<std::string> names;
+    Patches patches = cut_into_patches(make_texel_grid(body, group.grid_size), names);
+    FIG_CHECK(patches.row.size() * group.channels == group.values.size(),
+              "a row of static values for every cell");
+    add_group(g, group.channels, std::move(patches), names);
+  }
+}
+
+WeightLayout::WeightLayout(const Sampler& sampler) : own_network_(!sampler.shares_network) {
+  if (own_network_) {
+    const std::vector<size_t> sizes = sampler_token_sizes(sampler);
+    for (const Layer& layer : sampler.network.layers) {
+      if (layer.op == LayerOp::kConv2d)
+        add("layer." + std::to_string(tokens_.size()), sizes[tokens_.size()]);
+    }
+  }
+  if (sampler.shape_count > 0) add("shape", sampler.shape_count);
+  network_size_ = size_;
+  for (size_t g = 0; g < sampler.static_groups.size(); ++g) {
+    const SampledStaticGroup& group = sampler.static_groups[g];
+    std::vector<std::string> names;
+    for (size_t p = 0; p < group.patch_rows.size(); ++p) names.push_back(std::to_string(p));
+    add_group(g, group.channels, {{group.row.begin(), group.row.end()}, group.patch_rows}, names);
+  }
+}
+
+void WeightLayout::add(const std::string& name, size_t size) {
+  tokens_.push_back({name, size_, size});
+  size_ += size;
+}
+
+void WeightLayout::add_network(const Network& network) {
   for (const Layer& layer : network.layers) {
     if (layer.op == LayerOp::kConv2d)
-      add("layer." + std::to_string(tokens.size()), layer.weights.size() + layer.bias.size());
+      add("layer." + std::to_string(tokens_.size()), layer.weights.size() + layer.bias.size());
   }
-  if (shape_coefficients > 0) add("shape", shape_coefficients);
-  return tokens;
 }
 
-void read_weights(const Avatar& avatar, std::span<double> weights) {
+void WeightLayout::add_group(size_t group, uint32_t channels, Patches patches,
+                             const std::vector<std::string>& names) {
+  const size_t first = place_.size();
+  place_.resize(first + patches.row.size() * channels);
+  size_t next = 0;
+  for (size_t p = 0; p < patches.patch_rows.size(); ++p) {
+    size_t at = size_;
+    for (uint32_t k = 0; k < patches.patch_rows[p]; ++k, ++next) {
+      for (uint32_t c = 0; c < channels; ++c)
+        place_[first + size_t{patches.row[next]} * channels + c] = at++;
+    }
+    add("static." + std::to_string(group) + "." + names[p], at - size_);
+  }
+  patches_.push_back(std::move(patches));
+}
+
+void WeightLayout::read(const Avatar& avatar, std::span<double> weights) const {
+  FIG_CHECK(weights.size() == size_, "one value for each of the avatar's");
   auto out = weights.begin();
-  for (const Layer& layer : avatar.network.layers) {
-    out = std::copy(layer.weights.begin(), layer.weights.end(), out);
-    out = std::copy(layer.bias.begin(), layer.bias.end(), out);
+  if (own_network_) {
+    for (const Layer& layer : avatar.network.layers) {
+      out = std::copy(layer.weights.begin(), layer.weights.end(), out);
+      out = std::copy(layer.bias.begin(), layer.bias.end(), out);
+    }
   }
   out = std::copy(avatar.shape.begin(), avatar.shape.end(), out);
-  FIG_CHECK(out == weights.end(), "one value for each of the avatar's");
+  FIG_CHECK(static_cast<size_t>(out - weights.begin()) == network_size_,
+            "as many values of network and shape as the layout has");
+  if (place_.empty()) return;
+  size_t k = 0;
+  for (const StaticGroup& group : avatar.static_part.groups) {
+    for (size_t i = 0; i < group.values.size(); ++i)
+      weights[place_[k++]] = double{group.scale[i % group.channels]} * group.values[i];
+  }
+  FIG_CHECK(k == place_.size(), "as many static values as the layout has");
 }
 
-RowMatrix read_weights(const Population& population) {
-  const size_t shape = population.shape.size() / population.size();
-  const size_t size = vector_size(weight_tokens(population.network, shape));
-  RowMatrix all(static_cast<Eigen::Index>(population.size()), static_cast<Eigen::Index>(size));
+RowMatrix WeightLayout::read(const Population& population) const {
+  RowMatrix all(static_cast<Eigen::Index>(population.size()), static_cast<Eigen::Index>(size_));
   std::vector<float> storage(member_floats(population));
   for (size_t m = 0; m < population.size(); ++m)
-    read_weights(open_member(population, m, storage), {&all(Eigen::Index(m), 0), size});
+    read(open_member(population, m, storage), {&all(Eigen::Index(m), 0), size_});
   return all;
 }
 
-Avatar with_weights(const Avatar& avatar, std::span<const double> weights,
-                    std::span<float> storage) {
-  FIG_CHECK(storage.size() == weights.size(), "a float for each value");
-  std::transform(weights.begin(), weights.end(), storage.begin(),
-                 [](double value) { return static_cast<float>(value); });
+Avatar WeightLayout::with(const Avatar& avatar, std::span<const double> weights,
+                          WeightStorage& storage) const {
+  FIG_CHECK(weights.size() == size_, "one value for each of the avatar's");
+  size_t scales = 0;
+  for (const StaticGroup& group : avatar.static_part.groups) scales += group.channels;
+  storage.floats.resize(network_size_ + (place_.empty() ? 0 : scales));
+  std::transform(weights.begin(), weights.begin() + static_cast<ptrdiff_t>(network_size_),
+                 storage.floats.begin(), [](double value) { return static_cast<float>(value); });
   Avatar changed = avatar;
   size_t at = 0;
   const auto take = [&](size_t count) {
     at += count;
-    return std::span<const float>(storage.subspan(at - count, count));
+    return std::span<float>(storage.floats).subspan(at - count, count);
   };
-  for (Layer& layer : changed.network.layers) {
-    layer.weights = take(layer.weights.size());
-    layer.bias = take(layer.bias.size());
+  if (own_network_) {
+    for (Layer& layer : changed.network.layers) {
+      layer.weights = take(layer.weights.size());
+      layer.bias = take(layer.bias.size());
+    }
   }
   changed.shape = take(changed.shape.size());
   changed.fixed_point = {};
-  FIG_CHECK(at == weights.size(), "one value for each of the avatar's");
+  FIG_CHECK(at == network_size_, "as many values of network and shape as the layout has");
+  if (place_.empty()) return changed;
+  storage.integers.resize(place_.size());
+  size_t first = 0;
+  for (StaticGroup& group : changed.static_part.groups) {
+    const std::span<float> scale = take(group.channels);
+    const std::span<int8_t> out =
+        std::span<int8_t>(storage.integers).subspan(first, group.values.size());
+    for (uint32_t c = 0; c < group.channels; ++c) {
+      const double most =
+          group.first_channel + c < kStaticColour ? kMaxStaticValue : kMaxStaticLogGain;
+      double largest = 0;
+      for (size_t i = c; i < out.size(); i += group.channels)
+        largest = std::max(largest, std::abs(weights[place_[first + i]]));
+      scale[c] = std::max(static_cast<float>(std::min(largest, 0.999 * most) / 127),
+                          std::numeric_limits<float>::min());
+      for (size_t i = c; i < out.size(); i += group.channels)
+        out[i] = predict_static(static_cast<float>(weights[place_[first + i]]), scale[c]);
+    }
+    group.values = out;
+    group.scale = scale;
+    first += out.size();
+  }
   return changed;
 }
 

@@ -7,7 +7,8 @@
 // directions of a basis.
 //
 // One token a convolution, as the paper has them: its kernel [out,k,k,in] (OHWI), then its bias
-// [out]; one more for the shape coefficients. Standardised values are z = (w - mean) / scale with
+// [out]; one for the shape coefficients; one for every patch of a static group's grid, an eighth of
+// its side, with all of its channels. Standardised values are z = (w - mean) / scale with
 // the mean of every value and one scale a token, its root mean square deviation over the values
 // that vary. A value that all training members share (a dead channel's) has no deviation to be
 // measured in: z leaves it out as 0, and what is restored from z gets the shared value.
@@ -19,7 +20,9 @@
 #include <string>
 #include <vector>
 
+#include "figurine/body.h"
 #include "figurine/population.h"
+#include "figurine/sampler.h"
 
 namespace figurine::measure {
 
@@ -28,23 +31,61 @@ using RowVector = Eigen::RowVectorXd;
 
 // A stretch of a member's vector.
 struct Token {
-  std::string
-      name;  // "layer.N" by the order of the convolutions, as a run's weights are called; "shape"
+  std::string name;  // "layer.N" by the order of the convolutions, as a run's weights are called;
+                     // "shape"; "static.G.V.U": patch in row V, column U of group G's grid
   size_t begin = 0, size = 0;
 };
 
-// The tokens of avatars with this network, one after the other without gaps. No coefficients: no
-// token of the shape.
-std::vector<Token> weight_tokens(const Network& network, size_t shape_coefficients);
+// Memory behind an avatar that was made of a vector.
+struct WeightStorage {
+  std::vector<float> floats;
+  std::vector<int8_t> integers;
+};
 
-// The avatar's values in the order of its tokens. weights: [D].
-void read_weights(const Avatar& avatar, std::span<double> weights);
-// All members of a population, opened one after the other: [M,D].
-RowMatrix read_weights(const Population& population);
-// The avatar with other values, rounded to float into storage [D], which must outlive it; all else
-// is the given avatar's.
-Avatar with_weights(const Avatar& avatar, std::span<const double> weights,
-                    std::span<float> storage);
+// Which of an avatar's values are its own, and where they lie in its vector: the convolutions',
+// unless the network is everybody's; the shape coefficients; the static part, patch of cells by
+// patch, because what is far apart on the body has little to do with each other.
+class WeightLayout {
+ public:
+  // Avatars of this network without a static part. No coefficients: no token of the shape.
+  WeightLayout(const Network& network, size_t shape_coefficients);
+  // A population's members, on a body that they fit (check_avatar_fits_body).
+  WeightLayout(const Population& population, const Body& body);
+  // A sampler's avatars.
+  explicit WeightLayout(const Sampler& sampler);
+
+  const std::vector<Token>& tokens() const { return tokens_; }  // [L] one after the other, no gaps
+  size_t size() const { return size_; }                         // D
+  // Values of convolutions and shape, which come first.
+  size_t network_size() const { return network_size_; }
+  // Rows and cells of a static group's patches, as a sampler's package has them.
+  struct Patches {
+    std::vector<uint32_t> row, patch_rows;
+  };
+  const std::vector<Patches>& patches() const { return patches_; }  // [groups]
+
+  // The avatar's values in the order of its tokens. weights: [D].
+  void read(const Avatar& avatar, std::span<double> weights) const;
+  // All members of the population, opened one after the other: [M,D].
+  RowMatrix read(const Population& population) const;
+  // The avatar with other values, rounded to float, and its static ones to integers with 127 levels
+  // of either sign a channel, in the storage, which must outlive it; all else is the given
+  // avatar's.
+  Avatar with(const Avatar& avatar, std::span<const double> weights, WeightStorage& storage) const;
+
+ private:
+  void add(const std::string& name, size_t size);
+  void add_network(const Network& network);
+  void add_group(size_t group, uint32_t channels, Patches patches,
+                 const std::vector<std::string>& names);
+
+  bool own_network_ = true;
+  std::vector<Token> tokens_;
+  size_t size_ = 0, network_size_ = 0;
+  std::vector<Patches> patches_;
+  // [values of the static part, group after group as an avatar has them] where each lies.
+  std::vector<size_t> place_;
+};
 
 class Standardisation {
  public:

@@ -9,11 +9,8 @@
 namespace figurine::members {
 
 using measure::Picture;
-using measure::read_weights;
 using measure::RowMatrix;
 using measure::Standardisation;
-using measure::Token;
-using measure::weight_tokens;
 using pictures::Extent;
 using pictures::Shot;
 using pictures::ShotRenderer;
@@ -70,10 +67,6 @@ const Population& check(const Package& package, const Package& body) {
   return population;
 }
 
-std::vector<Token> tokens_of(const Population& population) {
-  return weight_tokens(population.network, population.shape.size() / population.size());
-}
-
 // Means of blocks; premultiplied, so that nothing has to be weighted.
 Picture shrink(const Picture& picture, uint32_t by) {
   Picture small{picture.width_px / by, picture.height_px / by, {}};
@@ -103,15 +96,16 @@ MemberSet::MemberSet(const Package& population_package, const Package& body_pack
       crew(options.threads, options.quiet),
       training(members_of(check(population_package, body_package), true)),
       held_out(members_of(population_package.population(), false)),
+      layout(population_package.population(), body_package.body()),
       standardisation([&] {
-        const RowMatrix weights = read_weights(population());
-        Standardisation made(rows_of(weights, training), tokens_of(population()));
+        const RowMatrix weights = layout.read(population());
+        Standardisation made(rows_of(weights, training), layout.tokens());
         training_z = made.standardise(rows_of(weights, training));
         held_out_z = made.standardise(rows_of(weights, held_out));
         return made;
       }()),
       renderer(body_package, fixed_poses(population(), options.motion, 2), make_shots()),
-      picture_px(std::clamp(2 * population().network.input_size, 128u, 256u)),
+      picture_px(std::clamp(2 * population().texels_a_side(), 128u, 256u)),
       pictures(population().size()) {
   frame_shots();
   crew.run("drawing members", population().size(),
@@ -140,7 +134,7 @@ Picture MemberSet::portrait(const Avatar& avatar, size_t shot, uint32_t height_p
   // Drawn at about the scale of the pictures that trained the presets, then shrunk: the splatter's
   // blur of 0.3 px^2 belongs to that scale.
   const auto finer = std::max(
-      1u, static_cast<uint32_t>(std::lround(3.2 * population().network.input_size / height_px)));
+      1u, static_cast<uint32_t>(std::lround(3.2 * population().texels_a_side() / height_px)));
   const auto width_px = static_cast<uint32_t>(std::lround(aspect * static_cast<float>(height_px)));
   ShotRenderer framed = renderer;
   framed.frame(shot, portrait_extent_, finer * width_px, finer * height_px, kPortraitMargin);

@@ -40,7 +40,8 @@ struct MemberSet {
   const Package* package;
   const Package* body;
   pictures::Crew crew;
-  std::vector<size_t> training, held_out;     // members
+  std::vector<size_t> training, held_out;  // members
+  measure::WeightLayout layout;
   measure::RowMatrix training_z, held_out_z;  // [N,D] and [H,D], standardised
   measure::Standardisation standardisation;   // by the training members alone
   pictures::ShotRenderer renderer;

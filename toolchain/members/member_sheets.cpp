@@ -12,7 +12,7 @@ namespace figurine::members {
 using measure::Picture;
 using measure::RowMatrix;
 using measure::RowVector;
-using measure::with_weights;
+using measure::WeightStorage;
 using train::OpenedMember;
 
 namespace {
@@ -68,7 +68,7 @@ struct Heights {
   uint32_t wall_px, mixture_px, close_px;
 };
 Heights heights_for(const Population& population) {
-  return population.network.input_size >= 64 ? Heights{256, 360, 420} : Heights{144, 176, 208};
+  return population.texels_a_side() >= 64 ? Heights{256, 360, 420} : Heights{144, 176, 208};
 }
 
 uint32_t rows_for(size_t members, uint32_t columns) {
@@ -170,9 +170,10 @@ ports::ImageU8 draw_mixtures(const MemberSet& set, const std::vector<MixedPair>&
   set.crew.run("strip", pairs.size() * kSteps, [&](size_t i) {
     const MixedPair& pair = pairs[i / kSteps];
     const OpenedMember a(set.population(), pair.a), b(set.population(), pair.b);
-    std::vector<float> storage;
-    rows[i / kSteps][i % kSteps] = set.portrait(
-        mix(a.avatar, b.avatar, kMixSteps[i % kSteps], storage), kFrontPortrait, height);
+    WeightStorage storage;
+    rows[i / kSteps][i % kSteps] =
+        set.portrait(mix(set.layout, a.avatar, b.avatar, kMixSteps[i % kSteps], storage),
+                     kFrontPortrait, height);
   });
   return tile(rows);
 }
@@ -199,10 +200,10 @@ ports::ImageU8 draw_people(const MemberSet& set, const std::vector<RowMatrix>& s
   set.crew.run("sheet", sets.size() * people, [&](size_t i) {
     const RowVector weights =
         set.standardisation.restore(sets[i / people].row(static_cast<Eigen::Index>(i % people)));
-    std::vector<float> storage(static_cast<size_t>(weights.size()));
-    rows[i / people][i % people] =
-        set.portrait(with_weights(like.avatar, {weights.data(), storage.size()}, storage),
-                     kFrontPortrait, heights_for(set.population()).wall_px);
+    WeightStorage storage;
+    rows[i / people][i % people] = set.portrait(
+        set.layout.with(like.avatar, {weights.data(), size_t(weights.size())}, storage),
+        kFrontPortrait, heights_for(set.population()).wall_px);
   });
   return tile(rows);
 }

@@ -17,14 +17,14 @@ using measure::high_pass;
 using measure::participation_ratio;
 using measure::Picture;
 using measure::PrincipalBasis;
-using measure::read_weights;
 using measure::RowMatrix;
 using measure::RowVector;
 using measure::SquaredError;
 using measure::summarise;
 using measure::Token;
 using measure::union_error;
-using measure::with_weights;
+using measure::WeightLayout;
+using measure::WeightStorage;
 using train::OpenedMember;
 
 namespace {
@@ -121,13 +121,13 @@ void replace_member(const MemberSet& set, const std::vector<PrincipalBasis>& bas
   const std::vector<Picture>& own = set.pictures[set.held_out[h]];
   const RowVector z = set.held_out_z.row(Eigen::Index(h));
   const double energy = z.squaredNorm();
-  std::vector<float> storage(size_t(z.size()));
+  WeightStorage storage;
   const auto try_weights = [&](const RowVector& instead, Replacement& replacement) {
     const RowVector weights = set.standardisation.restore(instead);
     replacement.lost[h] = (z - instead).squaredNorm() / energy;
-    replacement.error[h] = error_to(
-        own,
-        set.draw(with_weights(opened.avatar, {weights.data(), size_t(weights.size())}, storage)));
+    replacement.error[h] =
+        error_to(own, set.draw(set.layout.with(opened.avatar,
+                                               {weights.data(), size_t(weights.size())}, storage)));
   };
   const Projector projector(bases, z);
   for (size_t i = 0; i < ranks.size(); ++i) {
@@ -184,10 +184,10 @@ struct Mixture {
 
 Mixture measure_mixture(const MemberSet& set, const MixedPair& pair, double share) {
   const OpenedMember a(set.population(), pair.a), b(set.population(), pair.b);
-  std::vector<float> storage;
-  const Avatar mixed = mix(a.avatar, b.avatar, share, storage);
+  WeightStorage storage;
+  const Avatar mixed = mix(set.layout, a.avatar, b.avatar, share, storage);
   RowMatrix weights(1, set.training_z.cols());
-  read_weights(mixed, {weights.data(), size_t(weights.size())});
+  set.layout.read(mixed, {weights.data(), size_t(weights.size())});
   const std::vector<Picture> pictures = set.draw(mixed);
   return {high_pass_energy(pictures), foreground_pixels(pictures),
           nearest_to(set, set.standardisation.standardise(weights).row(0), pictures)};
@@ -241,18 +241,17 @@ nlohmann::json measure_span(const MemberSet& set, const std::vector<PrincipalBas
   return span;
 }
 
-Avatar mix(const Avatar& a, const Avatar& b, double share, std::vector<float>& storage) {
+Avatar mix(const WeightLayout& layout, const Avatar& a, const Avatar& b, double share,
+           WeightStorage& storage) {
   const auto between = [&](float x, float y) {
     return static_cast<float>((1 - share) * x + share * y);
   };
-  size_t size = a.shape.size();
-  for (const Layer& layer : a.network.layers) size += layer.weights.size() + layer.bias.size();
+  const size_t size = layout.size();
   std::vector<double> first(size), second(size);
-  read_weights(a, first);
-  read_weights(b, second);
+  layout.read(a, first);
+  layout.read(b, second);
   for (size_t i = 0; i < size; ++i) first[i] = (1 - share) * first[i] + share * second[i];
-  storage.resize(size);
-  Avatar mixed = with_weights(a, first, storage);
+  Avatar mixed = layout.with(a, first, storage);
   for (size_t c = 0; c < kMapChannels; ++c) {
     mixed.map_statistics.mean[c] = between(a.map_statistics.mean[c], b.map_statistics.mean[c]);
     mixed.map_statistics.scale[c] = between(a.map_statistics.scale[c], b.map_statistics.scale[c]);

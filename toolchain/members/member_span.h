@@ -40,7 +40,8 @@ nlohmann::json measure_interpolation(const MemberSet& set, const std::vector<Mix
 inline constexpr double kMixSteps[] = {0, 0.25, 0.5, 0.75, 1};
 
 // weights, shape, map statistics and decoding of (1 - share) a + share b; a and b must be of one
-// population. storage: [D].
-Avatar mix(const Avatar& a, const Avatar& b, double share, std::vector<float>& storage);
+// population, whose layout this is. Borrows from the storage.
+Avatar mix(const measure::WeightLayout& layout, const Avatar& a, const Avatar& b, double share,
+           measure::WeightStorage& storage);
 
 }  // namespace figurine::members

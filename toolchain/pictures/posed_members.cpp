@@ -66,7 +66,7 @@ PosedMembers::PosedMembers(const Package& population, const Package& body,
                            const PosedMembersOptions& options)
     : population_(&population.population()),
       options_(options),
-      picture_px_(std::clamp(2 * population_->network.input_size, 128u, 256u)) {
+      picture_px_(std::clamp(2 * population_->texels_a_side(), 128u, 256u)) {
   const std::vector<size_t> training = members_of(*population_, Split::kTrain);
   const std::string where = "population '" + population_->name + "'";
   if (training.size() < 2)

@@ -1,6 +1,7 @@
 #include "toolchain/population/build.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -8,6 +9,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "ports/host/files.h"
+#include "toolchain/body/atlas.h"
 #include "toolchain/body/clip.h"
 #include "toolchain/body/makehuman_model.h"
 #include "toolchain/body/mannequin.h"
@@ -15,6 +17,7 @@
 #include "toolchain/error.h"
 #include "toolchain/population/initial_weights.h"
 #include "toolchain/population/member.h"
+#include "toolchain/population/shared_network.h"
 #include "toolchain/train/csv.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/pack_population.h"
@@ -50,15 +53,33 @@ body::BodyModel body_model(const Recipe& recipe, const BuildOptions& options) {
   return body::make_makehuman_model(body::MakeHuman::load(options.makehuman), {});
 }
 
+// As options of `figurine-train body`.
+std::string describe_atlas(const std::array<double, body::kBodyPartCount>& weight) {
+  std::string text = " --atlas weighted";
+  for (size_t part = 0; part < weight.size(); ++part) {
+    char option[64];
+    std::snprintf(option, sizeof(option), " --weight %s=%g",
+                  to_string(static_cast<body::BodyPart>(part)), weight[part]);
+    if (weight[part] != 1) text += option;
+  }
+  return text;
+}
+
 void make_body(const Recipe& recipe, const BuildOptions& options, const State& state) {
   if (fs::exists(state.body())) return;
   const uint32_t uv_size = train::find_preset(recipe.training.preset).uv_size;
-  const body::BodyModel model = body_model(recipe, options);
+  body::BodyModel model = body_model(recipe, options);
+  std::string command = "body --uv " + std::to_string(uv_size);
+  if (recipe.atlas_weight) {
+    const uint32_t grid = std::max(1u, train::network_side(recipe.training));
+    model.surface = body::pack_atlas(
+        model.surface, {.weight = *recipe.atlas_weight, .uv_size = uv_size, .coarsest_grid = grid});
+    command += describe_atlas(*recipe.atlas_weight);
+  }
   const body::TexelBody texels = body::make_texel_body(model, uv_size);
   Provenance provenance = model.provenance;
   provenance.tool = "figurine-train " FIGURINE_VERSION;
-  provenance.settings.insert(provenance.settings.begin(),
-                             {"command", "body --uv " + std::to_string(uv_size)});
+  provenance.settings.insert(provenance.settings.begin(), {"command", command});
   throw_if_error(
       ports::write_file_atomically(
           state.body(), value_or_throw(write_package(texels.view(), provenance), state.body())),
@@ -126,12 +147,14 @@ void save_table(const State& state, const std::vector<TableRow>& table) {
 }
 
 void pack(const Recipe& recipe, const State& state) {
-  train::PackPopulationOptions options{.inputs = {state.members()},
-                                       .name = recipe.name,
-                                       .init = recipe.training.init,
-                                       .split = state.split(),
-                                       .levels = recipe.levels,
-                                       .quiet = true};
+  train::PackPopulationOptions options{
+      .inputs = {state.members()},
+      .name = recipe.name,
+      .init = recipe.training.init,
+      .shared = recipe.shared.identities > 0 ? state.shared() : std::string(),
+      .split = state.split(),
+      .levels = recipe.levels,
+      .quiet = true};
   throw_if_error(ports::write_file_atomically(state.package(), train::pack_population(options)),
                  "cannot save");
 }
@@ -242,7 +265,19 @@ void build(const BuildOptions& options) {
     }
     progress.show((at.round + at.share) / at.rounds, line);
   });
-  if (recipe.initial.rounds > 0) recipe.training.init = state.initial_weights();
+  make_shared_network(workshop, options.slots, [&](const SharedNetworkProgress& at) {
+    char line[128];
+    if (at.captured < at.people) {
+      std::snprintf(line, sizeof(line), "shared network, %zu of %zu people captured", at.captured,
+                    at.people);
+    } else {
+      std::snprintf(line, sizeof(line), "shared network, %zu people", at.people);
+    }
+    progress.show(at.share, line);
+  });
+  const bool alike = recipe.shared.identities > 0;
+  if (recipe.initial.rounds > 0 || alike) recipe.training.init = state.initial_weights();
+  recipe.training.freeze_network = alike;
   if (options.initial_weights_only) return;
 
   std::vector<TableRow> table;

@@ -7,8 +7,8 @@
 
 #include "ports/host/files.h"
 #include "toolchain/error.h"
+#include "toolchain/population/learners.h"
 #include "toolchain/train/interrupt.h"
-#include "toolchain/train/slots.h"
 #include "toolchain/train/trainer.h"
 
 namespace figurine::population {
@@ -54,36 +54,6 @@ std::string read_text(const std::string& path) {
 
 void save_text(const std::string& path, const std::string& text) {
   throw_if_error(ports::write_file_atomically(path, std::as_bytes(std::span(text))), "cannot save");
-}
-
-// The training identities in the order of the recipe.
-std::vector<Identity> learners(const Recipe& recipe) {
-  std::vector<Identity> chosen;
-  for (const Identity& identity : identities_of(recipe)) {
-    if (identity.split == Split::kTrain && chosen.size() < recipe.initial.identities)
-      chosen.push_back(identity);
-  }
-  return chosen;
-}
-
-// Runs all jobs and throws the first failure. waiting(number of those that have ended) is called
-// between.
-std::vector<std::string> run_all(size_t count, unsigned slots,
-                                 const std::function<std::string(size_t)>& job,
-                                 const std::function<std::string(size_t)>& name,
-                                 const std::function<void(size_t)>& waiting) {
-  std::vector<std::string> results(count);
-  std::string failure;
-  size_t finished = 0;
-  const auto ended = [&](size_t i, const train::JobResult& result) {
-    ++finished;
-    if (result.done) results[i] = result.text;
-    if (!result.done && !result.interrupted && failure.empty())
-      failure = name(i) + ": " + result.text;
-  };
-  train::run_in_slots(count, {.slots = slots}, job, ended, [&] { waiting(finished); });
-  if (!failure.empty()) throw InputError("initial weights: " + failure);
-  return results;
 }
 
 struct FineTuning {
@@ -162,14 +132,14 @@ void make_initial_weights(const Workshop& workshop, unsigned slots,
   const Rounds rounds{state.initial() + "/rounds"};
   train::make_folder(rounds.folder);
   const std::string captures = state.initial() + "/captures";
-  const std::vector<Identity> people = learners(workshop.recipe);
+  const std::vector<Identity> people = learners(workshop.recipe, recipe.identities);
   InitialWeightsProgress at{.people = people.size(), .rounds = recipe.rounds};
   const auto count_captures = [&](size_t finished) {
     at.captured = finished;
     show(at);
   };
   run_all(
-      people.size(), slots,
+      {.what = "initial weights", .slots = slots}, people.size(),
       [&](size_t i) { return capture_identity(workshop, people[i], captures), std::string(); },
       [&](size_t i) { return people[i].name(); }, count_captures);
   at.captured = people.size();
@@ -187,7 +157,8 @@ void make_initial_weights(const Workshop& workshop, unsigned slots,
                                   .seed = round + 1});
     };
     const std::vector<std::string> results = run_all(
-        recipe.per_round, slots, job, [&](size_t k) { return person(k).name(); },
+        {.what = "initial weights", .slots = slots}, recipe.per_round, job,
+        [&](size_t k) { return person(k).name(); },
         [&](size_t finished) {
           at.round = round, at.share = static_cast<double>(finished) / recipe.per_round;
           show(at);

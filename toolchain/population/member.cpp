@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "formats/writer/package_writer.h"
 #include "formats/writer/population_writer.h"
@@ -19,6 +20,7 @@
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/pack_avatar.h"
+#include "toolchain/train/package_file.h"
 #include "toolchain/train/trainer.h"
 
 namespace figurine::population {
@@ -51,7 +53,8 @@ train::TrainedAvatar train(const Workshop& workshop, const std::string& data,
                               .resume = fs::exists(train::RunDirectory{run}.run_json()),
                               .quiet = true};
   request.settings.freeze_pose = variant == Variant::kFrozenPose;
-  if (variant == Variant::kFromScratch) request.settings.init.clear();
+  if (variant == Variant::kFromScratch)
+    request.settings.init.clear(), request.settings.freeze_network = false;
   request.settings.threads = 1;
   train::train_avatar(request);
   return train::TrainedAvatar::open({.run = run, .data = {}, .body = {}, .threads = 1});
@@ -61,21 +64,29 @@ void save(const std::string& path, std::span<const std::byte> bytes) {
   throw_if_error(ports::write_file_atomically(path, bytes), "cannot save");
 }
 
+bool shares_network(const Workshop& workshop) { return workshop.recipe.shared.identities > 0; }
+
 // What the package's rounding costs this member: it is packed as a population of its own and looked
 // at again.
 nlohmann::json rounding_loss(const Workshop& workshop, train::TrainedAvatar& avatar,
                              std::span<const std::byte> package_bytes) {
   const AlignedBytes own(package_bytes);
   const Package package = value_or_throw(Package::open(own.bytes(), "member"), "member");
-  model::PoseUNet unet(package.avatar().network, {.precision = model::Precision::kFloat32,
-                                                  .seed = train::kInitialWeightsSeed});
-  if (!workshop.recipe.training.init.empty())
-    train::load_weights(workshop.recipe.training.init, unet);
+  std::optional<train::PackageFile> shared;
   std::vector<float> storage;
-  NewPopulation alone{.name = "alone",
-                      .initial = unet.export_network(storage),
-                      .coding = DifferenceCoding::kInt8,
-                      .levels = workshop.recipe.levels};
+  NewPopulation alone{.name = "alone", .levels = workshop.recipe.levels};
+  if (shares_network(workshop)) {
+    shared.emplace(train::open_package(workshop.state.shared(), PackageKind::kAvatar));
+    alone.shared = &shared->package.avatar();
+    alone.initial = alone.shared->network;
+    alone.coding = DifferenceCoding::kNone;
+  } else {
+    model::PoseUNet unet(package.avatar().network, {.precision = model::Precision::kFloat32,
+                                                    .seed = train::kInitialWeightsSeed});
+    if (!workshop.recipe.training.init.empty())
+      train::load_weights(workshop.recipe.training.init, unet);
+    alone.initial = unet.export_network(storage);
+  }
   alone.members.push_back({.avatar = &package.avatar(), .provenance = &package.provenance()});
   const AlignedBytes rounded(value_or_throw(write_population(alone), "member"));
   const Package opened = value_or_throw(Package::open(rounded.bytes(), "member"), "member");
@@ -150,7 +161,8 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
       .quiet = true, .view_frame_step = workshop.recipe.view_frame_step};
   const nlohmann::json quality = reconstruction::evaluate_reconstruction(avatar, looking);
   train::write_json(train::RunDirectory{run}.evaluation(), quality);
-  const std::vector<std::byte> package = train::pack_avatar(avatar, {run}, {.golden = false});
+  const std::vector<std::byte> package =
+      train::pack_avatar(avatar, {run}, {.golden = false, .network = !shares_network(workshop)});
   const nlohmann::json description = train::read_json(train::RunDirectory{run}.run_json());
   nlohmann::json row{{"identity", name},
                      {"split", to_string(identity.split)},

@@ -107,11 +107,46 @@ InitialWeightsRecipe read_initial(const JsonField& json) {
   return initial;
 }
 
+SharedNetworkRecipe read_shared(const JsonField& json) {
+  allow_only(json, {"identities", "iterations", "poses", "learning_rate"});
+  SharedNetworkRecipe shared{.identities = count(json["identities"], 2, kMostPeople),
+                             .iterations = whole(json["iterations"], 1, 1u << 30)};
+  if (json.has("poses")) shared.poses = count(json["poses"], 1, 64);
+  if (json.has("learning_rate")) shared.learning_rate = real(json["learning_rate"], 1e-9, 1);
+  return shared;
+}
+
+std::array<double, body::kBodyPartCount> read_atlas(const JsonField& json) {
+  std::array<double, body::kBodyPartCount> weight{};
+  weight.fill(1);
+  if (!json.json().is_object()) json.fail("not an object");
+  for (const auto& [name, value] : json.json().items()) {
+    const std::optional<body::BodyPart> part = body::find_body_part(name);
+    if (!part) json.fail("'" + name + "' is no part of the body");
+    weight[static_cast<size_t>(*part)] = real(json[name.c_str()], 1e-3, 1e3);
+  }
+  return weight;
+}
+
+// A network for every texel and nothing beside it, unless the recipe says what else.
+void read_parts(const JsonField& json, train::TrainSettings& settings) {
+  if (!json.has("static_grids")) {
+    settings = train::network_alone(settings);
+    if (json.has("network_size")) json["network_size"].fail("needs static_grids");
+    return;
+  }
+  settings.static_grids =
+      train::parse_static_grids(json["static_grids"].text(), json["static_grids"].where());
+  if (json.has("network_size")) settings.network_size = count(json["network_size"], 8, 1024);
+}
+
 // What a recipe may say of training. All else is what `figurine-train avatar` does by default.
 train::TrainSettings read_training(const JsonField& json, const std::string& preset) {
-  allow_only(json, {"iterations", "views_per_pose", "poses", "learning_rate", "seed",
-                    "spacing_scale", "standoff_weight", "precision"});
-  train::TrainSettings settings = train::network_alone(train::preset_settings(preset));
+  allow_only(json,
+             {"iterations", "views_per_pose", "poses", "learning_rate", "seed", "spacing_scale",
+              "standoff_weight", "precision", "static_grids", "network_size"});
+  train::TrainSettings settings = train::preset_settings(preset);
+  read_parts(json, settings);
   settings.schedule.budget = {.iterations = whole(json["iterations"], 1, 1u << 30), .seconds = 0};
   if (json.has("views_per_pose")) settings.views_per_pose = count(json["views_per_pose"], 1, 64);
   if (json.has("poses")) settings.poses_per_iteration = count(json["poses"], 1, 64);
@@ -129,6 +164,7 @@ train::TrainSettings read_training(const JsonField& json, const std::string& pre
     settings.bf16 = precision == "bf16";
   }
   settings.threads = 1;
+  train::check_parts(settings, json.where());
   return settings;
 }
 
@@ -168,10 +204,12 @@ void check_groups(const Recipe& recipe, const std::string& path) {
   uint32_t training = 0;
   for (const IdentityGroup& group : recipe.groups)
     training += group.split == Split::kTrain ? group.count : 0;
-  if (recipe.initial.identities > training) {
-    throw InputError(path +
-                     ": initial_weights.identities: " + std::to_string(recipe.initial.identities) +
-                     " of " + std::to_string(training) + " training identities");
+  for (const auto& [field, asked] : {std::pair{"initial_weights", recipe.initial.identities},
+                                     std::pair{"shared_network", recipe.shared.identities}}) {
+    if (asked > training) {
+      throw InputError(path + ": " + field + ".identities: " + std::to_string(asked) + " of " +
+                       std::to_string(training) + " training identities");
+    }
   }
 }
 
@@ -202,8 +240,9 @@ std::string Identity::name() const {
 Recipe read_recipe(const std::string& path) {
   const nlohmann::json text = train::read_json(path);
   const JsonField json(text, path);
-  allow_only(json, {"about", "name", "body", "preset", "seed", "motions", "capture", "groups",
-                    "initial_weights", "training", "package", "evaluation"});
+  allow_only(json,
+             {"about", "name", "body", "preset", "seed", "motions", "capture", "groups",
+              "initial_weights", "shared_network", "atlas", "training", "package", "evaluation"});
   Recipe recipe;
   recipe.name = json["name"].text();
   if (json.has("body")) {
@@ -218,8 +257,18 @@ Recipe read_recipe(const std::string& path) {
   if (recipe.motions.empty()) json["motions"].fail("is empty");
   read_capture(json["capture"], recipe);
   for (const JsonField& group : json["groups"].items()) recipe.groups.push_back(read_group(group));
-  recipe.initial = read_initial(json["initial_weights"]);
+  if (json.has("atlas")) recipe.atlas_weight = read_atlas(json["atlas"]);
+  if (recipe.mannequin && recipe.atlas_weight) json["atlas"].fail("is for the body makehuman");
   recipe.training = read_training(json["training"], json["preset"].text());
+  if (!json.has("shared_network")) {
+    recipe.initial = read_initial(json["initial_weights"]);
+  } else {
+    if (json.has("initial_weights"))
+      json["shared_network"].fail("and initial_weights: one of the two");
+    if (recipe.training.static_grids.empty())
+      json["shared_network"].fail("needs training.static_grids: a member is its map");
+    recipe.shared = read_shared(json["shared_network"]);
+  }
   if (json.has("package")) {
     allow_only(json["package"], {"levels"});
     recipe.levels = count(json["package"]["levels"], 1, kMostLevels);

@@ -3,6 +3,7 @@
 // the bit.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "formats/writer/population_writer.h"
+#include "toolchain/body/atlas.h"
 #include "toolchain/capture/camera_rings.h"
 #include "toolchain/capture/wardrobe.h"
 #include "toolchain/train/settings.h"
@@ -42,15 +44,28 @@ struct InitialWeightsRecipe {
   std::optional<float> standoff_weight;  // of a fine-tuning; training's if not given
 };
 
+// One network for all members, learnt together with the first identities of the training part, who
+// take turns (shared_network.h). Members then learn a static map alone, from the learners' mean.
+struct SharedNetworkRecipe {
+  uint32_t identities = 0;   // 0: none, every member has a network of its own
+  uint64_t iterations = 0;   // of all of them together
+  uint32_t poses = 1;        // an iteration, of one of them
+  double learning_rate = 0;  // training's if 0
+};
+
 struct Recipe {
   std::string name;
   bool mannequin = false;  // the procedural body instead of MakeHuman's: needs no data
-  uint64_t seed = 1;       // of the people; identity k depends on (seed, k) alone
+  // Texels a square metre by part of the body (toolchain/body/atlas.h); none: the mesh's own
+  // layout.
+  std::optional<std::array<double, body::kBodyPartCount>> atlas_weight;
+  uint64_t seed = 1;  // of the people; identity k depends on (seed, k) alone
   std::vector<MotionPiece> motions;
   uint32_t frames = 0;  // of a capture
   capture::CameraRingsOptions cameras;
   std::vector<IdentityGroup> groups;
-  InitialWeightsRecipe initial;
+  InitialWeightsRecipe initial;  // or
+  SharedNetworkRecipe shared;
   train::TrainSettings
       training;  // preset included; .init is the place of the initial weights once they are there
   uint32_t levels = kMostLevels;  // of the package's differences (population_writer.h); the members

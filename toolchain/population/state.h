@@ -5,7 +5,8 @@
 //   split.json                 who is in which part; written before anything is trained
 //   body.fgn                   the body of all
 //   initial/                   the shared initial weights: weights.safetensors when they are done,
-//                              history.csv, the rounds before
+//                              history.csv, the rounds before; of a shared network, its run and
+//                              shared.fgn, the avatar of its learners' mean map
 //   captures/ID, runs/ID       while a member is made; removed when it is done
 //   members/ID.fgn, ID.json    the avatar (float weights, no picture) and what it was measured to
 //                              be; ID.jpg: held-out pictures beside the
@@ -27,6 +28,7 @@ struct State {
   std::string body() const { return folder + "/body.fgn"; }
   std::string initial() const { return folder + "/initial"; }
   std::string initial_weights() const { return initial() + "/weights.safetensors"; }
+  std::string shared() const { return initial() + "/shared.fgn"; }
   std::string captures() const { return folder + "/captures"; }
   std::string run(const std::string& identity) const { return folder + "/runs/" + identity; }
   std::string scratch_run(const std::string& identity) const {

@@ -5,6 +5,7 @@
 
 #include "toolchain/error.h"
 #include "toolchain/reconstruction/reconstruction.h"
+#include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 
 namespace figurine::reconstruction {
@@ -21,9 +22,16 @@ nlohmann::json evaluate_requantization(train::TrainedAvatar& avatar, const Avata
   std::vector<float> storage;
   const Network own = unet.export_network(storage);
   const nlohmann::json before = evaluate_reconstruction(avatar, reconstruction);
+  train::StaticMap& statics = avatar.model().statics();
+  const torch::Tensor own_values = statics.values.clone();
   unet.import_network(member.network);
+  if (!member.static_part.empty()) {
+    train::take_static_part(member.static_part, train::head_layout(avatar.description().settings),
+                            statics);
+  }
   const nlohmann::json after = evaluate_reconstruction(avatar, reconstruction);
   unet.import_network(own);
+  statics.values.copy_(own_values);
   nlohmann::json report;
   for (const auto& [name, group] :
        {std::pair{"views", "held_out_views"}, std::pair{"poses", "held_out_poses"}}) {

@@ -29,8 +29,7 @@ KernelBasisReport make_kernel_basis(const std::string& shared, const std::vector
     people.push_back(other.weights().detach().clone());
   }
   KernelBasisReport report{.people = people.size(), .energy = {}};
-  const model::KernelBasis basis =
-      model::find_kernel_basis(network, people, rank, &report.energy);
+  const model::KernelBasis basis = model::find_kernel_basis(network, people, rank, &report.energy);
   TensorFile file;
   for (size_t l = 0; l < basis.size(); ++l) {
     NamedTensor rows = flat_tensor(basis[l].flatten());
@@ -50,7 +49,8 @@ model::KernelBasis read_kernel_basis(const std::string& path) {
     const NamedTensor& rows = found->second;
     if (rows.shape.size() != 2)
       throw InputError(path + ": " + found->first + ": is not rows of values");
-    basis.push_back(torch::tensor(at::ArrayRef<float>(rows.values)).view({rows.shape[0], rows.shape[1]}));
+    basis.push_back(
+        torch::tensor(at::ArrayRef<float>(rows.values)).view({rows.shape[0], rows.shape[1]}));
   }
   if (basis.empty()) throw InputError(path + ": " + basis_name(0) + ": missing");
   return basis;

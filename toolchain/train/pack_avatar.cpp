@@ -220,11 +220,17 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
     throw InputError(
         run.path +
         ": was trained with a frozen body pose, an experiment that no device can repeat");
+  if (!options.network && (!settings.freeze_network || settings.adapter.rank > 0)) {
+    throw InputError(run.path +
+                     ": its network is its own and cannot be left out (avatar "
+                     "--freeze-network)");
+  }
   const RoundedMap statics(avatar.model().statics(), head_layout(settings));
+  const bool has_network = settings.network && options.network;
   std::vector<float> storage;
-  Network network = make_network(settings);
+  Network network = has_network ? make_network(settings) : Network{};
   uint64_t macs = 0;
-  if (settings.network) {
+  if (has_network) {
     network = avatar.model().unet().export_network(storage);
     macs = count_macs(network, value_or_throw(infer_shapes(network, true), run.path));
   }
@@ -238,16 +244,16 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   }
   const PoseFeatures features = pose_features(rotations, avatar.body().joint_count());
   const GoldenView view = choose_golden_view(avatar);
-  const std::vector<std::byte> png = options.golden && options.float_weights
-                                         ? golden_png(avatar, statics.view(), view)
-                                         : std::vector<std::byte>{};
+  const bool has_picture = options.golden && options.float_weights && options.network;
+  const std::vector<std::byte> png =
+      has_picture ? golden_png(avatar, statics.view(), view) : std::vector<std::byte>{};
 
   Avatar content;
   content.kind() = {.body_name = avatar.body().name,
                     .body_hash = avatar.body_file().package.content_hash(),
                     .preset = settings.preset,
                     .template_mode = settings.template_mode,
-                    .fourier_octaves = settings.network ? settings.fourier_octaves : 0,
+                    .fourier_octaves = has_network ? settings.fourier_octaves : 0,
                     .network = network};
   content.traits() = {.map_statistics = {},
                       .decoding = settings.decoding,

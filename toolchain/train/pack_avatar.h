@@ -14,6 +14,8 @@ namespace figurine::train {
 struct PackOptions {
   std::string name;                // empty: the data folder's name
   bool golden = true;              // an expected picture of the float weights
+  bool network = true;             // false: the static part alone, a member of a population of one
+                                   // network (pack_population.h). Without a picture, then
   uint64_t peak_memory_bytes = 0;  // what the runtime needs for one instance; 0: not known yet
   bool float_weights = true;       // may be left out if there is fixed_point
   FixedPointNetwork fixed_point;   // borrowed; empty: none
@@ -51,7 +53,7 @@ std::array<double, 3> rotation_vector(const float* wxyz);
 
 // The package's bytes; the golden picture is of the static part as the package holds it. Throws
 // InputError: a run with frozen pose (a device always poses) or static colours as a sum, missing
-// consent, no weights.
+// consent, no weights, a network left out that the run has changed.
 std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& run,
                                    const PackOptions& options);
 

@@ -136,12 +136,23 @@ std::vector<std::byte> pack_population(const PackPopulationOptions& options) {
   std::map<std::string, Split> split;
   if (!options.split.empty()) split = read_split(options.split);
   const std::vector<Source> sources = open_all(options, progress, interrupt);
+  std::unique_ptr<PackageFile> shared;
+  if (!options.shared.empty())
+    shared = std::make_unique<PackageFile>(open_package(options.shared, PackageKind::kAvatar));
   const Avatar& first = sources.front().package().avatar();
   std::vector<float> storage;
-  NewPopulation population{.name = options.name,
-                           .initial = initial_weights(first.network, options.init, storage),
-                           .coding = options.coding,
-                           .levels = options.levels};
+  NewPopulation population{
+      .name = options.name, .coding = options.coding, .levels = options.levels};
+  if (shared) {
+    const Avatar& avatar = shared->package.avatar();
+    if (!avatar.has_network() || !avatar.holds(Precision::kFloat32))
+      throw InputError(options.shared + ": has no network in floats for the members to share");
+    population.initial = avatar.network;
+    population.shared = &avatar;
+    population.coding = DifferenceCoding::kNone;
+  } else {
+    population.initial = initial_weights(first.network, options.init, storage);
+  }
   for (const Source& source : sources) {
     const Package& package = source.package();
     NewMember& member = population.members.emplace_back(
@@ -159,8 +170,9 @@ std::vector<std::byte> pack_population(const PackPopulationOptions& options) {
       {"population.command", current_command()},
       {"population.commit", current_commit()},
       {"population.levels", std::to_string(options.levels)},
-      {"population.init",
-       options.init.empty() ? "seed " + std::to_string(kInitialWeightsSeed) : options.init}};
+      {"population.init", !options.shared.empty() ? options.shared
+                          : options.init.empty()  ? "seed " + std::to_string(kInitialWeightsSeed)
+                                                  : options.init}};
   population.progress = [&](size_t done) {
     progress.show(0.5 + 0.5 * static_cast<double>(done) / static_cast<double>(sources.size()),
                   std::to_string(done) + " members");

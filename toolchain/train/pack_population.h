@@ -20,8 +20,11 @@ struct PackPopulationOptions {
   std::string name = "population";
   std::string
       init;  // weights or run that all members started from; empty: the common initial weights
-  std::string split;  // {"train": [NAME...], "validation": [...], "test": [...]}, a whole number
-                      // standing for a name of six digits; empty: all train
+  std::string shared;  // avatar package whose network all members have, and whose static part is
+                       // the mean map; members may come without the network. Instead of init and
+                       // coding
+  std::string split;   // {"train": [NAME...], "validation": [...], "test": [...]}, a whole number
+                       // standing for a name of six digits; empty: all train
   DifferenceCoding coding = DifferenceCoding::kInt8;
   uint32_t levels = kMostLevels;  // of int8 (population_writer.h)
   uint32_t threads = 1;

@@ -17,6 +17,7 @@ measure::RowMatrix sample_weights(const Sampler& sampler, const DeviceSamplesOpt
                              static_cast<Eigen::Index>(sampler.mean.size()));
   train::Progress progress("sampling " + sampler.name, options.quiet);
   const train::InterruptGuard interrupt;
+  const measure::WeightLayout layout(sampler);
   SampledAvatar person;
   for (size_t i = 0; i < options.count; ++i) {
     if (interrupt.requested())
@@ -25,7 +26,7 @@ measure::RowMatrix sample_weights(const Sampler& sampler, const DeviceSamplesOpt
     throw_if_error(device->sample({.seed = seed, .steps = options.steps}, person),
                    sampler.name + ": seed " + std::to_string(seed));
     auto row = weights.row(static_cast<Eigen::Index>(i));
-    measure::read_weights(person.avatar(), {row.data(), static_cast<size_t>(row.size())});
+    layout.read(person.avatar(), {row.data(), static_cast<size_t>(row.size())});
     progress.show(static_cast<double>(i + 1) / static_cast<double>(options.count),
                   "seed " + std::to_string(seed));
   }

@@ -84,6 +84,8 @@ inline constexpr float kMaxStaticLogGain = 20;  // of a colour
 Status validate_static_part(const StaticPart& part, uint32_t uv_size);
 // The same, and one row of values for every cell that the body covers.
 Status validate_static_part(const StaticPart& part, const Body& body);
+// What they say of the scales alone.
+Status validate_static_scales(const StaticPart& part);
 
 // How small an avatar's Gaussians may be: at every texel what the sharpest camera that saw it in
 // training could resolve, a standard deviation in the canonical pose. Nothing that was trained says

@@ -187,8 +187,9 @@ std::string format_hash(const std::array<uint64_t, 2>& hash);  // 32 hex digits
 std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8);
 // Of GoldenSeed::hash: XXH3-128 (low, high) of all that an avatar in fixed point is decided by: per
 // convolution its weights, their scales and its biases as they lie in memory, then the shape
-// coefficients.
-std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape);
+// coefficients, then of every static group its values and their scales.
+std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape,
+                                     const StaticPart& static_part = {});
 
 // An avatar fits a body if the hash, the UV size, the cells of its static part, the number of its
 // smallest extents, the shape count and the golden pose's joint count do. kMismatch names both

@@ -1,12 +1,15 @@
 // A sampler: what draws the weights of new avatars on the device. A denoiser (the paper's
 // transformer) over a space of weights, in int8, and everything that all its avatars share.
 //
-// Letters: L tokens (one a convolution, one more for the shape coefficients if there are any), K_l
-// directions of token l, D = sum of K_l, W weights, biases and shape coefficients of an avatar, d =
-// d_model, f = feed_forward, B blocks, R rows of all matrices together.
+// Letters: L tokens (one a convolution, unless all avatars have one network; one for the shape
+// coefficients if there are any; one a patch of every static group), K_l directions of token l, D =
+// sum of K_l, W values of an avatar in its tokens, d = d_model, f = feed_forward, B blocks, R rows
+// of all matrices together.
 //
 //   weights:  w = mean + sum over k of (x_k * direction_scale_k) * q_k      x: D values, of mean
 //             square about 1; q_k: int8 direction
+//   static integers of them:  q = clamp(round(w / scale), -127, 127)        round: to nearest, ties
+//             to even
 //   a matrix: y_n = sum over k of row_scale_n * q_nk * x_k + bias_n         n: rows; q: int8, -127
 //       to 127
 //
@@ -54,19 +57,37 @@ struct GoldenSeed {
   std::array<uint64_t, 2> hash{0, 0};
 };
 
-// What all its avatars share: their kind, whose network is layers without weights, and traits,
-// whose golden frame is pose and camera of a sampled avatar's, with no hash and no picture.
+// A static group of sampled avatars. Its cells lie in patches, a token each: what is far apart on
+// the body has little to do with each other.
+struct SampledStaticGroup {
+  uint32_t first_channel = 0, channels = 0;
+  uint32_t grid_size = 0;
+  std::span<const float> scale;      // [channels], as StaticGroup's
+  std::span<const uint32_t> row;     // [M] of the group's values, each once, patch after patch
+  std::vector<uint32_t> patch_rows;  // cells of every patch; their sum is M
+};
+
+// What all its avatars share: their kind, whose network is layers without weights unless it is
+// everybody's, and traits, whose golden frame is pose and camera of a sampled avatar's, with no
+// hash and no picture.
 struct Sampler : AvatarKind, AvatarTraits {
   std::string name;
+  uint32_t uv_size = 0;                           // as an avatar's
+  bool antialiased = false;                       // all its avatars are
+  std::vector<SampledStaticGroup> static_groups;  // empty: its avatars have no static part
+  bool shares_network = false;                    // all its avatars have `network` and fixed_point
+  FixedPointNetwork fixed_point;                  // then, of `values`; empty otherwise
+
+  uint32_t texels_a_side() const { return uv_size != 0 ? uv_size : network.input_size; }  // T
 
   // All its avatars share these as well.
-  uint32_t shape_count = 0;          // shape coefficients of an avatar; the last token if any
+  uint32_t shape_count = 0;          // shape coefficients of an avatar; a token if any
   std::vector<Quantisation> values;  // [layers] of value 0 first, as FixedPointNetwork has them:
                                      // the training members' activation ranges
   PoseStatistics pose_statistics;    // of all training members together
 
   // The space of weights. Values of an avatar: per convolution its kernel (OHWI), then its bias;
-  // then the shape coefficients.
+  // then the shape coefficients; then patch after patch all channels of a cell, cell after cell.
   std::vector<uint32_t> ranks;             // [L] K_l, each at least 1
   std::span<const float> mean;             // [W]
   std::span<const int8_t> directions;      // token after token [K_l, values of the token]
@@ -96,7 +117,7 @@ struct Sampler : AvatarKind, AvatarTraits {
 };
 
 // Values of the tokens, [L]: what a convolution's kernel and bias count together, then the shape
-// coefficients. The network's shapes must be valid (FIG_CHECK).
+// coefficients, then the patches. The network's shapes must be valid (FIG_CHECK).
 std::vector<size_t> sampler_token_sizes(const Sampler& sampler);
 
 // Rows and columns of the denoiser's matrices, in their order.

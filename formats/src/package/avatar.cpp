@@ -90,6 +90,25 @@ Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader:
   return {};
 }
 
+Status read_fixed_convolutions(BlobReader& blobs, const Network& network, FixedPointNetwork& out) {
+  const std::vector<ValueShape> shapes = *infer_shapes(network, false);
+  out.convolutions.resize(network.layers.size());
+  for (size_t i = 0; i < network.layers.size(); ++i) {
+    const Layer& layer = network.layers[i];
+    if (layer.op != LayerOp::kConv2d) continue;
+    FixedPointConvolution& convolution = out.convolutions[i];
+    const std::string name = concatenate({"fixed.", i});
+    const uint32_t in_channels = shapes[layer.inputs[0]].channels;
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".weights",
+                                   {layer.out_channels, layer.kernel, layer.kernel, in_channels},
+                                   convolution.weights));
+    FIG_RETURN_IF_ERROR(
+        blobs.read(name + ".scale", {layer.out_channels}, convolution.weight_scale));
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, convolution.bias));
+  }
+  return {};
+}
+
 namespace {
 
 // A convolution without float weights is allowed only where none has any.
@@ -116,26 +135,12 @@ Status read_float_weights(BlobReader& blobs, bool has_fixed_point, Network& out)
 
 Status read_fixed_point(const schema::FixedPoint& table, BlobReader& blobs, const Network& network,
                         FixedPointNetwork& out) {
-  const std::vector<ValueShape> shapes = *infer_shapes(network, false);
   for (const schema::Quantisation* entry : *table.values()) {
     if (out.values.size() == kMaxLayers)
       return over_limit("avatar.fixed_point", "more than ", kMaxLayers, " values");
     out.values.push_back({.scale = entry->scale(), .zero_point = entry->zero_point()});
   }
-  out.convolutions.resize(network.layers.size());
-  for (size_t i = 0; i < network.layers.size(); ++i) {
-    const Layer& layer = network.layers[i];
-    if (layer.op != LayerOp::kConv2d) continue;
-    FixedPointConvolution& convolution = out.convolutions[i];
-    const std::string name = concatenate({"fixed.", i});
-    const uint32_t in_channels = shapes[layer.inputs[0]].channels;
-    FIG_RETURN_IF_ERROR(blobs.read(name + ".weights",
-                                   {layer.out_channels, layer.kernel, layer.kernel, in_channels},
-                                   convolution.weights));
-    FIG_RETURN_IF_ERROR(
-        blobs.read(name + ".scale", {layer.out_channels}, convolution.weight_scale));
-    FIG_RETURN_IF_ERROR(blobs.read(name + ".bias", {layer.out_channels}, convolution.bias));
-  }
+  FIG_RETURN_IF_ERROR(read_fixed_convolutions(blobs, network, out));
   if (!blobs.wanted().fixed_point) {
     out = {};
     return {};
@@ -155,42 +160,6 @@ Status read_weights(const schema::Avatar& table, BlobReader& blobs, Avatar& out)
              : Status();
 }
 
-// Texels a side, and the network's grid over them.
-Status read_uv_size(const schema::Avatar& table, Avatar& out) {
-  out.uv_size = table.uv_size();
-  if (out.uv_size > kMaxUvSize) return over_limit("avatar.uv_size", "is larger than ", kMaxUvSize);
-  if (out.has_network()) {
-    return grid_fits(out.texels_a_side(), out.network.input_size)
-               ? Status()
-               : corrupt("avatar.uv_size", "is not 1, 2, 4 or 8 times the network's input size");
-  }
-  if (out.uv_size == 0) return corrupt("avatar.uv_size", "is missing, and there is no network");
-  return out.fourier_octaves == 0
-             ? Status()
-             : corrupt("avatar.fourier_octaves", "is not 0, and there is no network");
-}
-
-Status read_static_part(const schema::Avatar& table, BlobReader& blobs, Avatar& out) {
-  std::vector<StaticGroup>& groups = out.static_part.groups;
-  const uint32_t count = table.static_groups() == nullptr ? 0 : table.static_groups()->size();
-  if (count == 0 && !out.has_network())
-    return corrupt("avatar", "has neither a network nor a static part");
-  if (count > kStaticChannels)
-    return over_limit("avatar.static_groups", "has more than ", kStaticChannels, " groups");
-  for (uint32_t g = 0; g < count; ++g) {
-    const schema::StaticGroup& entry = *table.static_groups()->Get(g);
-    StaticGroup& group = groups.emplace_back();
-    const std::string name = concatenate({"static.", g});
-    FIG_RETURN_IF_ERROR(blobs.read(name + ".scale", {BlobReader::kAny}, group.scale));
-    group.first_channel = entry.first_channel();
-    group.channels = static_cast<uint32_t>(group.scale.size());
-    group.grid_size = entry.grid_size();
-    FIG_RETURN_IF_ERROR(
-        blobs.read(name + ".values", {BlobReader::kAny, group.channels}, group.values));
-  }
-  return validate_static_part(out.static_part, out.texels_a_side());
-}
-
 Status read_filters(const schema::Avatar& table, BlobReader& blobs, Avatar& out) {
   out.antialiased = table.antialiased();
   SmallestExtents& extents = out.smallest_extents;
@@ -201,6 +170,44 @@ Status read_filters(const schema::Avatar& table, BlobReader& blobs, Avatar& out)
 }
 
 }  // namespace
+
+Status read_uv_size(uint32_t stated, const AvatarKind& kind, std::string_view owner,
+                    uint32_t& out) {
+  out = stated;
+  const std::string field = concatenate({owner, ".uv_size"});
+  if (stated > kMaxUvSize) return over_limit(field, "is larger than ", kMaxUvSize);
+  const uint32_t of_network = kind.network.input_size;
+  if (!kind.network.layers.empty()) {
+    return grid_fits(stated != 0 ? stated : of_network, of_network)
+               ? Status()
+               : corrupt(field, "is not 1, 2, 4 or 8 times the network's input size");
+  }
+  if (stated == 0) return corrupt(field, "is missing, and there is no network");
+  return kind.fourier_octaves == 0 ? Status()
+                                   : corrupt(concatenate({owner, ".fourier_octaves"}),
+                                             "is not 0, and there is no network");
+}
+
+Status read_static_part(const StaticGroupList* list, std::string_view owner, uint32_t uv_size,
+                        BlobReader& blobs, StaticPart& out) {
+  const uint32_t count = list == nullptr ? 0 : list->size();
+  if (count > kStaticChannels) {
+    return over_limit(concatenate({owner, ".static_groups"}), "has more than ", kStaticChannels,
+                      " groups");
+  }
+  for (uint32_t g = 0; g < count; ++g) {
+    const schema::StaticGroup& entry = *list->Get(g);
+    StaticGroup& group = out.groups.emplace_back();
+    const std::string name = concatenate({"static.", g});
+    FIG_RETURN_IF_ERROR(blobs.read(name + ".scale", {BlobReader::kAny}, group.scale));
+    group.first_channel = entry.first_channel();
+    group.channels = static_cast<uint32_t>(group.scale.size());
+    group.grid_size = entry.grid_size();
+    FIG_RETURN_IF_ERROR(
+        blobs.read(name + ".values", {BlobReader::kAny, group.channels}, group.values));
+  }
+  return validate_static_part(out, uv_size);
+}
 
 Status check_gaussians(const Budget& budget, uint32_t uv_size) {
   if (budget.gaussians > uint64_t{uv_size} * uv_size)
@@ -389,9 +396,12 @@ Status read_avatar(const schema::Index& index, BlobReader& blobs, const Budget& 
   FIG_RETURN_IF_ERROR(read_weights(table, blobs, out));
   if (out.has_network())
     FIG_RETURN_IF_ERROR(check_network_fits(out, out.decoding, "avatar", budget));
-  FIG_RETURN_IF_ERROR(read_uv_size(table, out));
+  FIG_RETURN_IF_ERROR(read_uv_size(table.uv_size(), out, "avatar", out.uv_size));
   FIG_RETURN_IF_ERROR(check_gaussians(budget, out.texels_a_side()));
-  FIG_RETURN_IF_ERROR(read_static_part(table, blobs, out));
+  FIG_RETURN_IF_ERROR(read_static_part(table.static_groups(), "avatar", out.texels_a_side(), blobs,
+                                       out.static_part));
+  if (!out.has_network() && out.static_part.empty())
+    return corrupt("avatar", "has neither a network nor a static part");
   FIG_RETURN_IF_ERROR(read_filters(table, blobs, out));
   if (table.pose_statistics() != nullptr) {
     FIG_RETURN_IF_ERROR(

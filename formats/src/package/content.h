@@ -71,6 +71,15 @@ Status read_maps_and_head(const Table& table, std::string_view owner, AvatarTrai
 // "prefix.i.weights" and "prefix.i.bias" of every convolution, finite.
 Status read_convolutions(BlobReader& blobs, std::string_view prefix, BlobReader::Presence presence,
                          Network& out);
+// "fixed.i.weights", ".scale" and ".bias" of every convolution; out has its values already, and is
+// not validated.
+Status read_fixed_convolutions(BlobReader& blobs, const Network& network, FixedPointNetwork& out);
+// Texels a side, and the network's grid over them. The network has its layers already.
+Status read_uv_size(uint32_t stated, const AvatarKind& kind, std::string_view owner, uint32_t& out);
+// The listed groups, over texels of uv_size a side. None: no list.
+using StaticGroupList = flatbuffers::Vector<flatbuffers::Offset<schema::StaticGroup>>;
+Status read_static_part(const StaticGroupList* list, std::string_view owner, uint32_t uv_size,
+                        BlobReader& blobs, StaticPart& out);
 // The declared Gaussians against the map of uv_size texels a side.
 Status check_gaussians(const Budget& budget, uint32_t uv_size);
 // The network against maps, head and budget; the avatar's weights are not looked at.

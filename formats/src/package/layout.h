@@ -40,14 +40,24 @@ inline constexpr uint64_t kKnownRequiredFeatures =
     kFeatureFixedPoint | kFeatureBoundedOffsets | kFeatureStaticPart | kFeatureFilters;
 
 // Whether kFeatureStaticPart is set.
-inline bool needs_static_feature(const Avatar& avatar) {
-  return !avatar.static_part.empty() || avatar.texels_a_side() != avatar.network.input_size;
+// Of an Avatar, a Population or a Sampler.
+template <class Content>
+bool needs_static_feature(const Content& content) {
+  bool has_groups = false;
+  if constexpr (requires { content.static_groups; }) {
+    has_groups = !content.static_groups.empty();
+  } else {
+    has_groups = !content.static_part.empty();
+  }
+  return has_groups || content.texels_a_side() != content.network.input_size;
 }
 
 // Whether kFeatureFilters is set.
 inline bool needs_filter_feature(const Avatar& avatar) {
   return !avatar.smallest_extents.empty() || avatar.antialiased;
 }
+inline bool needs_filter_feature(const Population& population) { return population.antialiased; }
+inline bool needs_filter_feature(const Sampler& sampler) { return sampler.antialiased; }
 
 // The first multiple of the blob alignment at or after the offset. Offsets are below 2^63.
 constexpr uint64_t align_up(uint64_t offset) {

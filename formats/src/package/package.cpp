@@ -107,16 +107,26 @@ Status check_feature(const layout::Header& header, uint64_t feature, bool held, 
 Status check_features(const layout::Header& header, const schema::Index& index,
                       const Content& content) {
   const Avatar* avatar = std::get_if<Avatar>(&content);
+  const PopulationContent* of_many = std::get_if<PopulationContent>(&content);
+  const Sampler* sampler = std::get_if<Sampler>(&content);
+  const auto needs = [&](auto feature) {
+    return avatar != nullptr    ? feature(*avatar)
+           : of_many != nullptr ? feature(of_many->population)
+                                : sampler != nullptr && feature(*sampler);
+  };
+  const bool has_static =
+                 needs([](const auto& held) { return layout::needs_static_feature(held); }),
+             has_filters =
+                 needs([](const auto& held) { return layout::needs_filter_feature(held); });
   FIG_RETURN_IF_ERROR(
       check_feature(header, kFeatureFixedPoint,
-                    avatar != nullptr && index.content_as_Avatar()->fixed_point() != nullptr,
+                    (avatar != nullptr && index.content_as_Avatar()->fixed_point() != nullptr) ||
+                        (sampler != nullptr && sampler->shares_network),
                     "fixed point", "a network is "));
-  FIG_RETURN_IF_ERROR(check_feature(header, kFeatureStaticPart,
-                                    avatar != nullptr && layout::needs_static_feature(*avatar),
-                                    "static parts", "an avatar is "));
-  FIG_RETURN_IF_ERROR(check_feature(header, kFeatureFilters,
-                                    avatar != nullptr && layout::needs_filter_feature(*avatar),
-                                    "filters", "an avatar is "));
+  FIG_RETURN_IF_ERROR(
+      check_feature(header, kFeatureStaticPart, has_static, "static parts", "an avatar is "));
+  FIG_RETURN_IF_ERROR(
+      check_feature(header, kFeatureFilters, has_filters, "filters", "an avatar is "));
   return check_feature(header, kFeatureBoundedOffsets, has_bounded_offsets(content),
                        "bounded offsets", "a decoding is ");
 }
@@ -243,7 +253,8 @@ std::array<uint64_t, 2> hash_picture(std::span<const uint8_t> rgba8) {
   return xxh3_128(std::as_bytes(rgba8));
 }
 
-std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape) {
+std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<const float> shape,
+                                     const StaticPart& static_part) {
   std::vector<std::span<const std::byte>> parts;
   for (const FixedPointConvolution& convolution : fixed.convolutions) {
     for (const std::span<const std::byte> part :
@@ -253,6 +264,10 @@ std::array<uint64_t, 2> hash_weights(const FixedPointNetwork& fixed, std::span<c
     }
   }
   parts.push_back(std::as_bytes(shape));
+  for (const StaticGroup& group : static_part.groups) {
+    parts.push_back(std::as_bytes(group.values));
+    parts.push_back(std::as_bytes(group.scale));
+  }
   return xxh3_128(parts);
 }
 

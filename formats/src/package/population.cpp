@@ -108,26 +108,40 @@ Status read_members(const schema::Population& table, PopulationContent& out) {
   return {};
 }
 
-Status check_scales(std::span<const float> scales) {
+Status check_scales(std::span<const float> scales, const std::string& field, float most) {
   for (size_t i = 0; i < scales.size(); ++i) {
-    if (!(scales[i] >= std::numeric_limits<float>::min() && scales[i] <= kMaxScale)) {
-      return corrupt("population.scale", "value ", i, " is not positive, or too large");
-    }
+    if (!(scales[i] >= std::numeric_limits<float>::min() && scales[i] <= most))
+      return corrupt(field, "value ", i, " is not positive, or too large");
   }
   return {};
 }
 
-Status check_frequencies(std::span<const int16_t> frequency) {
+Status check_frequencies(std::span<const int16_t> frequency, const std::string& field) {
   for (size_t at = 0; at < frequency.size(); at += kRansValues) {
     int64_t sum = 0;
     for (size_t k = at; k < at + kRansValues; ++k) {
-      if (frequency[k] < 0) return corrupt("population.frequency", "value ", k, " is negative");
+      if (frequency[k] < 0) return corrupt(field, "value ", k, " is negative");
       sum += frequency[k];
     }
-    if (sum != int64_t{kRansTotal}) {
-      return corrupt("population.frequency", "row ", at / kRansValues, " has the sum ", sum,
-                     ", not ", kRansTotal);
-    }
+    if (sum != int64_t{kRansTotal})
+      return corrupt(field, "row ", at / kRansValues, " has the sum ", sum, ", not ", kRansTotal);
+  }
+  return {};
+}
+
+// The members' streams "population.NAMEcode", one after the other, and their tables, `rows` of
+// them.
+Status read_streams(BlobReader& blobs, const std::string& name, uint32_t members, uint32_t rows,
+                    std::span<const int16_t>& frequency, std::span<const uint8_t>& code,
+                    std::span<const uint32_t>& code_end) {
+  const std::string prefix = concatenate({"population.", name});
+  FIG_RETURN_IF_ERROR(blobs.read(prefix + "frequency", {rows, uint32_t{kRansValues}}, frequency));
+  FIG_RETURN_IF_ERROR(blobs.read(prefix + "code", {BlobReader::kAny}, code));
+  FIG_RETURN_IF_ERROR(blobs.read(prefix + "code_end", {members}, code_end));
+  FIG_RETURN_IF_ERROR(check_frequencies(frequency, prefix + "frequency"));
+  if (!std::is_sorted(code_end.begin(), code_end.end()) || code_end.back() != code.size()) {
+    return corrupt(prefix + "code_end", "is not ascending, or does not end where ", prefix,
+                   "code does");
   }
   return {};
 }
@@ -135,16 +149,28 @@ Status check_frequencies(std::span<const int16_t> frequency) {
 Status read_int8(BlobReader& blobs, uint32_t members, uint32_t rows, uint32_t convolutions,
                  Population& out) {
   FIG_RETURN_IF_ERROR(blobs.read("population.scale", {members, rows}, out.scale));
-  FIG_RETURN_IF_ERROR(
-      blobs.read("population.frequency", {convolutions, uint32_t{kRansValues}}, out.frequency));
-  FIG_RETURN_IF_ERROR(blobs.read("population.code", {BlobReader::kAny}, out.code));
-  FIG_RETURN_IF_ERROR(blobs.read("population.code_end", {members}, out.code_end));
-  FIG_RETURN_IF_ERROR(check_scales(out.scale));
-  FIG_RETURN_IF_ERROR(check_frequencies(out.frequency));
-  if (!std::is_sorted(out.code_end.begin(), out.code_end.end()) ||
-      out.code_end.back() != out.code.size()) {
-    return corrupt("population.code_end",
-                   "is not ascending, or does not end where population.code does");
+  FIG_RETURN_IF_ERROR(check_scales(out.scale, "population.scale", kMaxScale));
+  return read_streams(blobs, "", members, convolutions, out.frequency, out.code, out.code_end);
+}
+
+// Bounds as validate_static_part has them for an avatar's scales.
+Status read_static_streams(BlobReader& blobs, Population& out) {
+  if (out.static_part.empty()) return {};
+  const auto members = static_cast<uint32_t>(out.size());
+  uint32_t channels = 0;
+  for (const StaticGroup& group : out.static_part.groups) channels += group.channels;
+  FIG_RETURN_IF_ERROR(blobs.read("population.static_scale", {members, channels}, out.static_scale));
+  FIG_RETURN_IF_ERROR(read_streams(blobs, "static_", members, channels, out.static_frequency,
+                                   out.static_code, out.static_code_end));
+  for (uint32_t m = 0; m < members; ++m) {
+    StaticPart own = out.static_part;
+    uint32_t channel = m * channels;
+    for (StaticGroup& group : own.groups) {
+      group.scale = out.static_scale.subspan(channel, group.channels);
+      channel += group.channels;
+    }
+    FIG_RETURN_IF_ERROR(
+        validate_static_scales(own).within(concatenate({"population.static_scale: member ", m})));
   }
   return {};
 }
@@ -170,6 +196,7 @@ Status read_differences(BlobReader& blobs, Population& out) {
   }
   if (weights > std::numeric_limits<uint32_t>::max())
     return over_limit("population.network", "has more than 2^32 weights");
+  if (out.coding == DifferenceCoding::kNone) return {};
   const auto members = static_cast<uint32_t>(out.size()), channels = static_cast<uint32_t>(rows);
   FIG_RETURN_IF_ERROR(blobs.read("population.bias", {members, channels}, out.bias));
   FIG_RETURN_IF_ERROR(
@@ -238,9 +265,16 @@ Status read_population(const schema::Index& index, BlobReader& blobs, const Budg
                                  layout::kMaxNameBytes, false, out.quality_names));
   FIG_RETURN_IF_ERROR(read_members(table, content));
   FIG_RETURN_IF_ERROR(check_members_fit(out, budget));
-  FIG_RETURN_IF_ERROR(check_gaussians(budget, out.network.input_size));
+  FIG_RETURN_IF_ERROR(read_uv_size(table.uv_size(), out, "population", out.uv_size));
+  FIG_RETURN_IF_ERROR(check_gaussians(budget, out.texels_a_side()));
+  out.antialiased = table.antialiased();
   FIG_RETURN_IF_ERROR(read_convolutions(blobs, "initial", BlobReader::kRequired, out.network));
   FIG_RETURN_IF_ERROR(read_differences(blobs, out));
+  FIG_RETURN_IF_ERROR(read_static_part(table.static_groups(), "population", out.texels_a_side(),
+                                       blobs, out.static_part));
+  FIG_RETURN_IF_ERROR(read_static_streams(blobs, out));
+  if (out.coding == DifferenceCoding::kNone && out.static_part.empty())
+    return corrupt("population.coding", "says that nobody differs, and there is no static part");
   const auto members = static_cast<uint32_t>(out.size());
   FIG_RETURN_IF_ERROR(blobs.read("population.shape", {members, BlobReader::kAny}, out.shape,
                                  BlobReader::kMayBeAbsent));

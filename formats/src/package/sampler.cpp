@@ -40,8 +40,83 @@ Status read_shared(const schema::Sampler& table, const Budget& budget, Sampler& 
     return over_limit("sampler.shape_count", "is above ", kMaxShapeCoefficients);
   FIG_RETURN_IF_ERROR(read_maps_and_head(table, "sampler", out));
   FIG_RETURN_IF_ERROR(check_network_fits(out, out.decoding, "sampler", budget));
-  FIG_RETURN_IF_ERROR(check_gaussians(budget, out.network.input_size));
+  FIG_RETURN_IF_ERROR(read_uv_size(table.uv_size(), out, "sampler", out.uv_size));
+  FIG_RETURN_IF_ERROR(check_gaussians(budget, out.texels_a_side()));
+  out.antialiased = table.antialiased();
+  out.shares_network = table.shares_network();
   return read_quantisation(table, out);
+}
+
+// The network that all its avatars have, in floats and in integers.
+Status read_shared_network(BlobReader& blobs, Sampler& out) {
+  if (!out.shares_network) return {};
+  FIG_RETURN_IF_ERROR(read_convolutions(blobs, "network", BlobReader::kRequired, out.network));
+  out.fixed_point.values = out.values;
+  FIG_RETURN_IF_ERROR(read_fixed_convolutions(blobs, out.network, out.fixed_point));
+  return validate_fixed_point(out.network, out.fixed_point);
+}
+
+// Every row of 0 to count - 1, once.
+bool is_permutation_of_rows(std::span<const uint32_t> rows) {
+  std::vector<bool> seen(rows.size());
+  for (const uint32_t row : rows) {
+    if (row >= rows.size() || seen[row]) return false;
+    seen[row] = true;
+  }
+  return true;
+}
+
+Status read_group(const schema::SampledStaticGroup& table, size_t number, BlobReader& blobs,
+                  SampledStaticGroup& out) {
+  const std::string name = concatenate({"static.", number});
+  FIG_RETURN_IF_ERROR(blobs.read(name + ".scale", {BlobReader::kAny}, out.scale));
+  FIG_RETURN_IF_ERROR(blobs.read(name + ".row", {BlobReader::kAny}, out.row));
+  out.first_channel = table.first_channel();
+  out.channels = static_cast<uint32_t>(out.scale.size());
+  out.grid_size = table.grid_size();
+  if (out.row.size() > uint64_t{kMaxUvSize} * kMaxUvSize)
+    return over_limit(name + ".row", "has more rows than a map has texels");
+  if (!is_permutation_of_rows(out.row))
+    return corrupt(name + ".row", "does not name every row of its values once");
+  if (table.patch_rows()->size() > layout::kMaxListEntries)
+    return over_limit(name + ".patch_rows", "has more than ", layout::kMaxListEntries, " entries");
+  uint64_t rows = 0;
+  for (const uint32_t patch : *table.patch_rows()) {
+    if (patch == 0) return corrupt(name + ".patch_rows", "a patch has no cells");
+    rows += patch;
+    out.patch_rows.push_back(patch);
+  }
+  if (rows != out.row.size())
+    return corrupt(name + ".patch_rows", "count ", rows, " cells, ", name, ".row has ",
+                   out.row.size());
+  return {};
+}
+
+// Checked as the static part of an avatar whose integers are all 0.
+Status read_groups(const schema::Sampler& table, BlobReader& blobs, Sampler& out) {
+  const uint32_t count = table.static_groups() == nullptr ? 0 : table.static_groups()->size();
+  if (count > kStaticChannels)
+    return over_limit("sampler.static_groups", "has more than ", kStaticChannels, " groups");
+  StaticPart part;
+  size_t most = 0;
+  for (uint32_t g = 0; g < count; ++g) {
+    SampledStaticGroup& group = out.static_groups.emplace_back();
+    FIG_RETURN_IF_ERROR(read_group(*table.static_groups()->Get(g), g, blobs, group));
+    most = std::max(most, group.row.size() * std::min<size_t>(group.channels, kStaticChannels));
+  }
+  const std::vector<int8_t> zeros(most);
+  for (const SampledStaticGroup& group : out.static_groups) {
+    const size_t values = group.row.size() * std::min<size_t>(group.channels, kStaticChannels);
+    part.groups.push_back({.first_channel = group.first_channel,
+                           .channels = group.channels,
+                           .grid_size = group.grid_size,
+                           .values = std::span(zeros).first(values),
+                           .scale = group.scale});
+  }
+  FIG_RETURN_IF_ERROR(validate_static_part(part, out.texels_a_side()));
+  if (out.shares_network && out.static_groups.empty())
+    return corrupt("sampler.shares_network", "is true, and there is no static part to sample");
+  return {};
 }
 
 Status read_ranks(const schema::Sampler& table, size_t tokens, Sampler& out) {
@@ -204,6 +279,8 @@ Status read_sampler(const schema::Index& index, BlobReader& blobs, const Budget&
   const schema::Sampler& table = *index.content_as_Sampler();
   FIG_RETURN_IF_ERROR(read_text(index.name(), "sampler.name", layout::kMaxNameBytes, out.name));
   FIG_RETURN_IF_ERROR(read_shared(table, budget, out));
+  FIG_RETURN_IF_ERROR(read_shared_network(blobs, out));
+  FIG_RETURN_IF_ERROR(read_groups(table, blobs, out));
   const std::vector<size_t> tokens =
       sampler_token_sizes(out);  // the network's shapes are valid from here on
   FIG_RETURN_IF_ERROR(read_ranks(table, tokens.size(), out));

@@ -40,7 +40,8 @@ class SampledAvatar {
 
  private:
   friend class AvatarSampler;
-  std::vector<float> weights_;  // [W]
+  std::vector<float> weights_;    // [W]
+  std::vector<int8_t> integers_;  // of the static part
   FixedPointStorage fixed_point_;
   Avatar avatar_;
 };

@@ -147,7 +147,8 @@ fig_status fig_sampled_get_info(fig_sampled sampled, fig_sampled_info* info) {
                     [](const Layer& layer) { return layer.op == LayerOp::kConv2d; }));
   whole.shape_count = static_cast<uint32_t>(avatar.shape.size());
   whole.shape = avatar.shape.data();
-  const std::array<uint64_t, 2> hash = hash_weights(avatar.fixed_point, avatar.shape);
+  const std::array<uint64_t, 2> hash =
+      hash_weights(avatar.fixed_point, avatar.shape, avatar.static_part);
   std::copy(hash.begin(), hash.end(), whole.weights_hash);
   fill_struct(whole, info);
   return FIG_OK;

@@ -57,7 +57,8 @@ struct AvatarSampler::Impl {
 
   // Values [D] to an avatar in float and in fixed point.
   Status decode(std::span<const double> values, std::vector<float>& weights,
-                FixedPointStorage& fixed_point, Avatar& avatar) const {
+                std::vector<int8_t>& integers, FixedPointStorage& fixed_point,
+                Avatar& avatar) const {
     weights.resize(sampler.mean.size());
     decode_weights(sampler, values, weights);
     for (const float weight : weights) {
@@ -67,18 +68,25 @@ struct AvatarSampler::Impl {
     avatar.kind() = sampler.kind();
     avatar.traits() = sampler.traits();
     avatar.name = sampler.name;
+    avatar.uv_size = sampler.uv_size;
+    avatar.antialiased = sampler.antialiased;
     avatar.pose_statistics = sampler.pose_statistics;
     std::span<const float> rest = weights;
     const std::vector<size_t> sizes = sampler_token_sizes(sampler);
     size_t token = 0;
     for (Layer& layer : avatar.network.layers) {
-      if (layer.op != LayerOp::kConv2d) continue;
+      if (layer.op != LayerOp::kConv2d || sampler.shares_network) continue;
       const size_t kernel = sizes[token++] - layer.out_channels;
       layer.weights = rest.first(kernel);
       layer.bias = rest.subspan(kernel, layer.out_channels);
       rest = rest.subspan(kernel + layer.out_channels);
     }
-    avatar.shape = rest;
+    avatar.shape = rest.first(sampler.shape_count);
+    avatar.static_part = decode_static_part(sampler, rest.subspan(sampler.shape_count), integers);
+    if (sampler.shares_network) {
+      avatar.fixed_point = sampler.fixed_point;
+      return {};
+    }
     FIG_RETURN_IF_ERROR(fixed_point.quantise(avatar.network, sampler.values));
     avatar.fixed_point = fixed_point.view();
     return {};
@@ -171,7 +179,7 @@ Status AvatarSampler::sample(const SampleRequest& request, SampledAvatar& out, T
                       impl.clean.span(size));
   Watcher watcher([&](size_t step, const NoiseLevel& level, std::span<const double> x0) {
     if (trace == nullptr || !predictor.traced.ok()) return;
-    predictor.traced = impl.decode(x0, out.weights_, out.fixed_point_, out.avatar_);
+    predictor.traced = impl.decode(x0, out.weights_, out.integers_, out.fixed_point_, out.avatar_);
     if (predictor.traced.ok())
       predictor.traced = trace->after_step(static_cast<uint32_t>(step) + 1, level.lambda, out);
   });
@@ -180,7 +188,7 @@ Status AvatarSampler::sample(const SampleRequest& request, SampledAvatar& out, T
   FIG_RETURN_IF_ERROR(solve<double>(options, impl.levels, predictor, storage, impl.z.span(size),
                                     trace == nullptr ? nullptr : &watcher));
   FIG_RETURN_IF_ERROR(predictor.traced);
-  return impl.decode(impl.z.span(size), out.weights_, out.fixed_point_, out.avatar_);
+  return impl.decode(impl.z.span(size), out.weights_, out.integers_, out.fixed_point_, out.avatar_);
 }
 
 Isa AvatarSampler::isa() const { return impl_->isa; }

@@ -313,7 +313,8 @@ class AvatarSamplerTest : public testing::Test {
     SampledAvatar person;
     const Status status = sampler_->sample(request, person);
     EXPECT_TRUE(status.ok()) << status.message();
-    return hash_weights(person.avatar().fixed_point, person.avatar().shape);
+    return hash_weights(person.avatar().fixed_point, person.avatar().shape,
+                        person.avatar().static_part);
   }
 
   RandomSampler random_;
@@ -439,6 +440,69 @@ TEST(AvatarSampler, OutlivesThePackageThatItWasMadeFrom) {
   }
   EXPECT_EQ(hash_weights(early.avatar().fixed_point, early.avatar().shape),
             hash_weights(late.avatar().fixed_point, late.avatar().shape));
+}
+
+// Every value says which cell, channel and group it is of; beyond the range it is clamped.
+TEST(DecodeStaticPart, PutsCellsWhereTheirRowsSay) {
+  const samples::StaticSamplerSample sample;
+  const Sampler& sampler = sample.sampler;
+  std::vector<float> patches;
+  for (const SampledStaticGroup& group : sampler.static_groups) {
+    for (const uint32_t row : group.row) {
+      for (uint32_t c = 0; c < group.channels; ++c)
+        patches.push_back(group.scale[c] * (static_cast<float>(row * 14 + c) - 30.4f));
+    }
+  }
+  patches[0] = 1e6f, patches[1] = -1e6f;
+  std::vector<int8_t> integers;
+  const StaticPart part = decode_static_part(sampler, patches, integers);
+  ASSERT_EQ(part.groups.size(), 2u);
+  for (size_t g = 0; g < 2; ++g) {
+    const StaticGroup& group = part.groups[g];
+    EXPECT_EQ(group.grid_size, sampler.static_groups[g].grid_size);
+    for (size_t i = 0; i < group.values.size(); ++i) {
+      const auto row = static_cast<int>(i / group.channels),
+                 c = static_cast<int>(i % group.channels);
+      if (g == 0 && row == 1 && c < 2) {
+        EXPECT_EQ(group.values[i], c == 0 ? 127 : -127);
+      } else {
+        EXPECT_EQ(group.values[i], row * 14 + c - 30) << g << " " << i;
+      }
+    }
+  }
+}
+
+TEST(AvatarSampler, MakesStaticPartsOverOneNetwork) {
+  const samples::StaticSamplerSample sample;
+  const Sampler& description = sample.sampler;
+  auto created = AvatarSampler::create(description);
+  ASSERT_TRUE(created.ok()) << created.status().message();
+  SampledAvatar person, other, again;
+  ASSERT_TRUE((*created)->sample({.seed = 5}, person).ok());
+  ASSERT_TRUE((*created)->sample({.seed = 6}, other).ok());
+  ASSERT_TRUE((*created)->sample({.seed = 5}, again).ok());
+  const Avatar& avatar = person.avatar();
+  EXPECT_TRUE(validate_static_part(avatar.static_part, 8).ok());
+  EXPECT_TRUE(avatar.antialiased);
+  EXPECT_EQ(avatar.texels_a_side(), 8u);
+  EXPECT_EQ(avatar.shape.size(), 2u);
+  for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
+    EXPECT_TRUE(std::ranges::equal(avatar.network.layers[i].weights,
+                                   description.network.layers[i].weights));
+  }
+  EXPECT_TRUE(validate_fixed_point(avatar.network, avatar.fixed_point).ok());
+  const auto hash = [](const SampledAvatar& of) {
+    return hash_weights(of.avatar().fixed_point, of.avatar().shape, of.avatar().static_part);
+  };
+  EXPECT_EQ(hash(person), hash(again));
+  EXPECT_NE(hash(person), hash(other));
+  size_t differ = 0;
+  for (size_t g = 0; g < 2; ++g) {
+    const std::span<const int8_t> a = avatar.static_part.groups[g].values,
+                                  b = other.avatar().static_part.groups[g].values;
+    for (size_t i = 0; i < a.size(); ++i) differ += a[i] != b[i];
+  }
+  EXPECT_GT(differ, 0u);
 }
 
 class Counted : public AvatarSampler::Trace {

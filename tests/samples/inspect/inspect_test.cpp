@@ -74,7 +74,8 @@ void expect_refused(const Outcome& run, const std::string& words) {
 TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
   for (const std::string kind :
        {"body", "avatar", "fixed_point_avatar", "static_avatar", "static_only_avatar",
-        "filtered_avatar", "motion", "population", "half_population", "sampler"}) {
+        "filtered_avatar", "motion", "population", "half_population", "static_population",
+        "sampler", "static_sampler"}) {
     const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");

@@ -193,7 +193,8 @@ TEST_F(PackSampler, SeedsOfTheDeviceAreSeedsOfTheTrainersFloats) {
     SampledAvatar person;
     ASSERT_TRUE((*device)->sample({.seed = seed}, person).ok());
     std::vector<double> weights(static_cast<size_t>(floats.cols()));
-    measure::read_weights(person.avatar(), weights);
+    const Avatar& avatar = person.avatar();
+    measure::WeightLayout(avatar.network, avatar.shape.size()).read(avatar, weights);
     EXPECT_TRUE(std::ranges::equal(weights, sampled.row(static_cast<Eigen::Index>(seed - 3))))
         << "as evaluations see them";
     const measure::RowVector mean = trained.space->standardisation().mean();
@@ -205,6 +206,61 @@ TEST_F(PackSampler, SeedsOfTheDeviceAreSeedsOfTheTrainersFloats) {
                 std::sqrt(error / power));
     EXPECT_LT(std::sqrt(error / power), 0.1);
   }
+}
+
+// Members that are maps over one network: the space has a token of the shape and one a patch, and a
+// device makes the people that the trainer's floats make.
+TEST_F(PackSampler, OfOneNetworkSamplesMaps) {
+  tests::write_people_of_one_network(path("alike.fgn"));
+  SamplerRequest request{.population = path("alike.fgn"),
+                         .run = path("alike"),
+                         .settings = {},
+                         .command = "test",
+                         .quiet = true};
+  request.settings.space = {.variant = Variant::kBasis, .rank = 8};
+  request.settings.shape = {
+      .token_sizes = {}, .d_model = 32, .blocks = 2, .heads = 4, .feed_forward = 64};
+  request.settings.batch = 8, request.settings.schedule.peak = 3e-3;
+  request.settings.schedule.ramp_iterations = 5;
+  request.settings.ema = 0.9;
+  request.settings.schedule.budget = {.iterations = 200, .seconds = 0};
+  try {
+    train_sampler(request);
+    FAIL() << "patches are the body's";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("--body"), std::string::npos) << error.what();
+  }
+  request.body = path("body.fgn");
+  train_sampler(request);
+  PackSamplerOptions pack = options();
+  pack.run = path("alike");
+  const tests::AlignedBytes bytes(pack_sampler(pack));
+  const Result<Package> opened = Package::open(bytes.bytes(), "sampler");
+  ASSERT_TRUE(opened.ok()) << opened.status().message();
+  const Sampler& sampler = opened->sampler();
+  EXPECT_TRUE(sampler.shares_network);
+  EXPECT_FALSE(sampler.static_groups.empty());
+  const TrainedSampler trained = TrainedSampler::open(path("alike"));
+  EXPECT_EQ(sampler_token_sizes(sampler).size(), trained.layout->tokens().size());
+  const measure::RowMatrix floats =
+      verify::draw_weights(trained, {.first_seed = 3, .count = 2, .steps = 8});
+  const measure::RowMatrix sampled =
+      verify::sample_weights(sampler, {.first_seed = 3, .count = 2, .quiet = true});
+  ASSERT_EQ(sampled.cols(), floats.cols());
+  const measure::RowVector mean = trained.space->standardisation().mean();
+  for (Eigen::Index row = 0; row < 2; ++row) {
+    const double error = std::sqrt((sampled.row(row) - floats.row(row)).squaredNorm() /
+                                   (floats.row(row) - mean).squaredNorm());
+    std::printf("  seed %d: relative error %.3f\n", int(row) + 3, error);
+    EXPECT_LT(error, 0.1);
+  }
+  const tests::SyntheticBody body = tests::make_test_body();
+  const auto device = AvatarSampler::create(sampler);
+  ASSERT_TRUE(device.ok());
+  SampledAvatar person;
+  ASSERT_TRUE((*device)->sample({.seed = 3}, person).ok());
+  const Status fits = check_avatar_fits_body(person.avatar(), *body.package);
+  EXPECT_TRUE(fits.ok()) << fits.message();
 }
 
 TEST_F(PackSampler, TheReportGoesAlong) {

@@ -8,6 +8,8 @@
 #include <bit>
 #include <cmath>
 
+#include "figurine/texel_grid.h"
+#include "formats/writer/population_writer.h"
 #include "runtime/test_packages.h"
 
 namespace figurine::measure::weight_space_test {
@@ -141,7 +143,8 @@ TEST(WeightSpace, TokensAreAnAvatarsConvolutionsAndItsShape) {
   const tests::SyntheticBody body = make_test_body();
   const tests::SyntheticAvatar made = make_test_avatar(body);
   const Avatar& avatar = made.package->avatar();
-  const std::vector<Token> tokens = weight_tokens(avatar.network, avatar.shape.size());
+  const WeightLayout layout(avatar.network, avatar.shape.size());
+  const std::vector<Token>& tokens = layout.tokens();
   ASSERT_EQ(tokens.size(), 16u);
   EXPECT_EQ(tokens.front().name, "layer.0");
   EXPECT_EQ(tokens[14].name, "layer.14");
@@ -149,19 +152,86 @@ TEST(WeightSpace, TokensAreAnAvatarsConvolutionsAndItsShape) {
   EXPECT_EQ(tokens.back().begin, count_parameters(avatar.network));
   EXPECT_EQ(tokens.back().size, avatar.shape.size());
   std::vector<double> weights(tokens.back().begin + tokens.back().size);
-  read_weights(avatar, weights);
+  layout.read(avatar, weights);
   EXPECT_EQ(weights[0], avatar.network.layers[0].weights[0]);
   EXPECT_EQ(weights[avatar.network.layers[0].weights.size()], avatar.network.layers[0].bias[0]);
   EXPECT_EQ(weights.back(), avatar.shape.back());
-  std::vector<float> storage(weights.size());
-  const Avatar same = with_weights(avatar, weights, storage);
+  WeightStorage storage;
+  const Avatar same = layout.with(avatar, weights, storage);
   for (size_t i = 0; i < avatar.network.layers.size(); ++i) {
     EXPECT_TRUE(
         std::ranges::equal(same.network.layers[i].weights, avatar.network.layers[i].weights));
     EXPECT_TRUE(std::ranges::equal(same.network.layers[i].bias, avatar.network.layers[i].bias));
   }
   EXPECT_TRUE(std::ranges::equal(same.shape, avatar.shape));
-  EXPECT_EQ(weight_tokens(avatar.network, 0).size(), 15u);
+  EXPECT_EQ(WeightLayout(avatar.network, 0).tokens().size(), 15u);
+}
+
+// Two people of one network: their vectors are shape and map alone, cells patch by patch.
+TEST(WeightSpace, OfOneNetworkAVectorIsShapeAndMapPatchByPatch) {
+  const tests::SyntheticBody body = make_test_body();
+  const tests::SyntheticAvatar shared = make_test_avatar(body),
+                               other = make_test_avatar(
+                                   body, {.shape = {1, -2}, .seed = 1, .name = "other"});
+  const uint32_t side = body.package->body().uv_size;
+  const TexelGrid grid = make_texel_grid(body.package->body(), side);
+  const size_t cells = grid.cell_count();
+  std::vector<int8_t> mean(cells * 3), own(cells * 3);
+  for (size_t i = 0; i < own.size(); ++i)
+    mean[i] = static_cast<int8_t>(i % 11), own[i] = static_cast<int8_t>(int(i * 7) % 255 - 127);
+  const std::vector<float> scale{0.01f, 0.02f, 0.03f};
+  const auto with_map = [&](const tests::SyntheticAvatar& of, const std::vector<int8_t>& values) {
+    Avatar avatar = of.package->avatar();
+    avatar.network = shared.package->avatar().network;
+    avatar.static_part.groups = {{kStaticColour, 3, side, values, scale}};
+    return avatar;
+  };
+  const Avatar one = with_map(shared, mean), two = with_map(other, own);
+  const Provenance provenance{.tool = "test"};
+  NewPopulation made{.name = "two",
+                     .initial = one.network,
+                     .shared = &one,
+                     .coding = DifferenceCoding::kNone,
+                     .members = {{&one, &provenance}, {&two, &provenance}}};
+  const tests::AlignedBytes bytes(*write_population(made));
+  const Result<Package> package = Package::open(bytes.bytes(), "two");
+  ASSERT_TRUE(package.ok()) << package.status().message();
+  const WeightLayout layout(package->population(), body.package->body());
+  ASSERT_EQ(layout.tokens().front().name, "shape");
+  EXPECT_EQ(layout.network_size(), 2u);
+  EXPECT_EQ(layout.size(), 2 + cells * 3);
+  size_t next = 0;
+  for (const Token& token : layout.tokens()) {
+    EXPECT_EQ(token.begin, next);
+    EXPECT_GT(token.size, 0u);
+    next += token.size;
+  }
+  EXPECT_EQ(next, layout.size());
+  const RowMatrix all = layout.read(package->population());
+  EXPECT_EQ(all(1, 0), two.shape[0]);
+  // Every value once: the same squares as the map itself has.
+  double squares = 0;
+  for (size_t i = 0; i < own.size(); ++i) squares += std::pow(double{scale[i % 3]} * own[i], 2);
+  const auto map = all.row(1).tail(static_cast<Eigen::Index>(own.size()));
+  EXPECT_NEAR(map.squaredNorm(), squares, 1e-9 * squares);
+  // The first cell lies in the patch that its row and column say.
+  const uint32_t patch = std::max(4u, side / 8), v = grid.cell[0] / side, u = grid.cell[0] % side;
+  const std::string name =
+      "static.0." + std::to_string(v / patch) + "." + std::to_string(u / patch);
+  const auto token = std::ranges::find(layout.tokens(), name, &Token::name);
+  ASSERT_NE(token, layout.tokens().end());
+  EXPECT_EQ(all(1, Eigen::Index(token->begin)), double{scale[0]} * own[0]);
+  // Back to an avatar: the network untouched, the map to within half a step of its largest value.
+  WeightStorage storage;
+  const std::vector<double> row(&all(1, 0), &all(1, 0) + layout.size());
+  const Avatar back = layout.with(one, row, storage);
+  EXPECT_TRUE(std::ranges::equal(back.network.layers[0].weights, one.network.layers[0].weights));
+  EXPECT_TRUE(std::ranges::equal(back.shape, two.shape));
+  const StaticGroup& group = back.static_part.groups[0];
+  for (size_t i = 0; i < own.size(); ++i) {
+    ASSERT_NEAR(group.scale[i % 3] * static_cast<float>(group.values[i]),
+                scale[i % 3] * static_cast<float>(own[i]), 0.51f * scale[i % 3]);
+  }
 }
 
 }  // namespace

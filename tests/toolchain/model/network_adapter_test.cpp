@@ -48,14 +48,16 @@ NetworkAdapter make(AdapterKind kind, const PoseUNet& unet, uint32_t rank, uint6
 // The definitions of the header, kernel by kernel; factors: [Q].
 std::vector<double> folded_in_double(const NetworkAdapter& adapter, const PoseUNet& unet,
                                      int64_t most_rank) {
-  const std::vector<double> base = to_double(adapter.base()), factors = to_double(adapter.factors()),
+  const std::vector<double> base = to_double(adapter.base()),
+                            factors = to_double(adapter.factors()),
                             basis = to_double(adapter.basis());
   std::vector<double> folded = base;
   const bool shared = adapter.kind() == AdapterKind::kBasis;
   size_t at = 0, basis_at = 0;
   for (const KernelMatrix& kernel : unet.kernels()) {
     const auto rank = static_cast<size_t>(std::min({most_rank, kernel.rows, kernel.columns})),
-               rows = static_cast<size_t>(kernel.rows), columns = static_cast<size_t>(kernel.columns),
+               rows = static_cast<size_t>(kernel.rows),
+               columns = static_cast<size_t>(kernel.columns),
                begin = static_cast<size_t>(kernel.begin);
     const double *a = &factors[at], *b = shared ? &basis[basis_at] : a + rows * rank;
     at += rows * rank + (shared ? 0 : rank * columns);

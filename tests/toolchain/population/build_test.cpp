@@ -30,9 +30,9 @@ constexpr const char* kPeople[] = {"000000", "000001", "000002", "000010"};
 
 struct Workplace {
   TemporaryFolder folder;
-  Workplace() {
+  explicit Workplace(const nlohmann::json& recipe = testing_tools::small_recipe()) {
     testing_tools::write_swinging_motion(folder.path("swinging.fgn"));
-    train::write_json(folder.path("recipe.json"), testing_tools::small_recipe());
+    train::write_json(folder.path("recipe.json"), recipe);
   }
   BuildOptions options(const std::string& state) const {
     return {.recipe = folder.path("recipe.json"),
@@ -109,6 +109,42 @@ TEST(BuildPopulation, LeavesMembersTableSplitAndPackage) {
     EXPECT_NE(std::string(error.what()).find("training: differs from"), std::string::npos)
         << error.what();
   }
+}
+
+TEST(BuildPopulation, OfOneNetworkHoldsItOnceAndAMapForEach) {
+  const Workplace place(testing_tools::small_shared_recipe());
+  build(place.options("state"));
+  const State state{place.folder.path("state")};
+  const train::PackageFile package = train::open_package(state.package(), PackageKind::kPopulation),
+                           shared = train::open_package(state.shared(), PackageKind::kAvatar);
+  const Population& population = package.package.population();
+  ASSERT_EQ(population.size(), 4u);
+  EXPECT_EQ(population.coding, DifferenceCoding::kNone);
+  const Network& network = shared.package.avatar().network;
+  std::vector<float> storage(member_floats(population));
+  for (size_t m = 0; m < 4; ++m) {
+    const Avatar member = open_member(population, m, storage);
+    for (size_t i = 0; i < network.layers.size(); ++i)
+      EXPECT_TRUE(std::ranges::equal(member.network.layers[i].weights, network.layers[i].weights));
+    const train::PackageFile own =
+        train::open_package(state.member(kPeople[m]), PackageKind::kAvatar);
+    EXPECT_FALSE(own.package.avatar().has_network()) << "a member's file is its map alone";
+    EXPECT_TRUE(std::ranges::equal(own.package.avatar().static_part.groups[0].values,
+                                   member.static_part.groups[0].values));
+  }
+  const nlohmann::json row = train::read_json(state.row("000010"));
+  EXPECT_GT(row.at("quality").at("held_out_views").at("psnr_db").get<double>(), 10);
+  EXPECT_LT(std::abs(row.at("rounding").at("views").at("loss_db").get<double>()), 1);
+  EXPECT_EQ(entries(state.initial()), 2u) << "weights and avatar; captures and run are gone";
+
+  const Workplace again(testing_tools::small_shared_recipe());
+  BuildOptions one_slot = again.options("state");
+  one_slot.slots = 1;
+  one_slot.initial_weights_only = true;
+  build(one_slot);
+  EXPECT_EQ(bytes_of(State{again.folder.path("state")}.initial_weights()),
+            bytes_of(state.initial_weights()))
+      << "whatever the number of slots";
 }
 
 TEST(BuildPopulation, KilledAnywhereItGoesOnToTheSameBits) {

@@ -14,6 +14,7 @@ namespace figurine::population::recipe_test {
 namespace {
 
 using testing_tools::small_recipe;
+using testing_tools::small_shared_recipe;
 using testing_tools::TemporaryFolder;
 
 Recipe read(const nlohmann::json& json) {
@@ -40,6 +41,24 @@ TEST(Recipe, SaysWhoIsMadeAndHow) {
   ASSERT_EQ(people.size(), 4u);
   EXPECT_EQ(people[3].name(), "000010");
   EXPECT_EQ(people[3].split, Split::kTest);
+}
+
+TEST(Recipe, MayHaveOneNetworkForAllAndMapsForEach) {
+  const Recipe recipe = read(small_shared_recipe());
+  EXPECT_EQ(recipe.shared.identities, 2u);
+  EXPECT_EQ(recipe.shared.iterations, 40u);
+  EXPECT_EQ(recipe.shared.poses, 2u);
+  EXPECT_EQ(recipe.initial.rounds, 0u);
+  EXPECT_EQ(train::to_string(recipe.training.static_grids), "all:T");
+  EXPECT_EQ(train::network_side(recipe.training), 16u);
+  EXPECT_TRUE(read(small_recipe()).training.static_grids.empty()) << "off unless it is said";
+  nlohmann::json json = small_shared_recipe();
+  json["body"] = "makehuman";
+  json["atlas"] = {{"hands", 5.5}, {"head", 2}};
+  const Recipe weighted = read(json);
+  ASSERT_TRUE(weighted.atlas_weight);
+  EXPECT_EQ((*weighted.atlas_weight)[size_t(body::BodyPart::kHands)], 5.5);
+  EXPECT_EQ((*weighted.atlas_weight)[size_t(body::BodyPart::kLegs)], 1);
 }
 
 TEST(Recipe, TheSplitNamesWhatOnlyTheTestPartWears) {
@@ -87,6 +106,23 @@ TEST(Recipe, RefusesWhatItCannotMeanInOneLine) {
       {[](auto& j) { j["training"]["precision"] = "f16"; }, "training.precision: 'f16' is neither"},
       {[](auto& j) { j["package"] = {{"levels", 128}}; }, "levels: must lie in 1 to 127"},
       {[](auto& j) { j["evaluation"]["frozen"] = {77}; }, "frozen: identity 77 is in no group"},
+      {[](auto& j) { j["shared_network"] = small_shared_recipe()["shared_network"]; },
+       "shared_network: and initial_weights: one of the two"},
+      {[](auto& j) { j["training"]["network_size"] = 16; },
+       "training.network_size: needs static_grids"},
+      {[](auto& j) { j["training"]["static_grids"] = "hair:T"; }, "\"hair\" are none of"},
+      {[](auto& j) { j["atlas"] = {{"hands", 2}}; }, "atlas: is for the body makehuman"},
+      {[](auto& j) { j["body"] = "makehuman", j["atlas"] = {{"ears", 2}}; },
+       "'ears' is no part of the body"},
+      {[](auto& j) {
+         j = small_shared_recipe();
+         j["training"].erase("static_grids"), j["training"].erase("network_size");
+       },
+       "shared_network: needs training.static_grids"},
+      {[](auto& j) { j = small_shared_recipe(), j["shared_network"]["identities"] = 4; },
+       "shared_network.identities: 4 of 3 training identities"},
+      {[](auto& j) { j = small_shared_recipe(), j["shared_network"]["rounds"] = 4; },
+       "shared_network: rounds: unknown field"},
   };
   for (const auto& [damage, words] : cases) {
     nlohmann::json json = small_recipe();

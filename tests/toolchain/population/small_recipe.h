@@ -27,6 +27,16 @@ inline nlohmann::json small_recipe() {
   })");
 }
 
+// The same people with one network for all and a static map each.
+inline nlohmann::json small_shared_recipe() {
+  nlohmann::json recipe = small_recipe();
+  recipe.erase("initial_weights");
+  recipe["shared_network"] = {{"identities", 2}, {"iterations", 40}, {"poses", 2}};
+  recipe["training"]["static_grids"] = "all:T";
+  recipe["training"]["network_size"] = 16;
+  return recipe;
+}
+
 // Its motion, which lies beside it.
 inline void write_swinging_motion(const std::string& path) {
   body::MotionClip clip;
