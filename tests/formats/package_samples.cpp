@@ -376,16 +376,7 @@ SamplerSample::SamplerSample() {
     for (size_t i = 0; i < tokens[token]; ++i) mean.push_back(pattern(i + token));
   }
   sampler.denoiser = {.d_model = 8, .blocks = 2, .heads = 2, .feed_forward = 12};
-  size_t rows = 0;
-  for (const MatrixShape& matrix : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
-    for (size_t k = 0; k < size_t{matrix.rows} * matrix.columns; ++k) {
-      matrices.push_back(static_cast<int8_t>(int(k * 53 + rows) % 255 - 127));
-    }
-    rows += matrix.rows;
-  }
-  for (size_t n = 0; n < rows; ++n) row_scale.push_back(0x1p-10f * static_cast<float>(n % 3 + 1));
-  bias = patterned(rows);
-  position = patterned((tokens.size() + 1) * sampler.denoiser.d_model);
+  fill_denoiser(tokens.size());
   norm = patterned(size_t{2 * sampler.denoiser.blocks + 1} * 2 * sampler.denoiser.d_model);
   pose_mean = avatar.pose_mean;
   pose_covariance = avatar.pose_covariance;
@@ -442,6 +433,18 @@ MotionSample::MotionSample() {
             .rotations = rotations};
 }
 
+void SamplerSample::fill_denoiser(size_t tokens) {
+  size_t rows = 0;
+  for (const MatrixShape& matrix : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
+    for (size_t k = 0; k < size_t{matrix.rows} * matrix.columns; ++k)
+      matrices.push_back(static_cast<int8_t>(int(k * 53 + rows) % 255 - 127));
+    rows += matrix.rows;
+  }
+  for (size_t n = 0; n < rows; ++n) row_scale.push_back(0x1p-10f * static_cast<float>(n % 3 + 1));
+  bias = patterned(rows);
+  position = patterned((tokens + 1) * sampler.denoiser.d_model);
+}
+
 StaticSamplerSample::StaticSamplerSample() : geometry_row{1, 0}, colour_row{4, 0, 3, 1, 2} {
   network.with_floats();
   sampler.name = "sample sampler of static parts";
@@ -473,15 +476,7 @@ void StaticSamplerSample::fill_space() {
       direction_scale.push_back(0x1p-10f * static_cast<float>(token + 1));
     for (size_t i = 0; i < tokens[token]; ++i) mean.push_back(pattern(i + token));
   }
-  size_t rows = 0;
-  for (const MatrixShape& matrix : denoiser_matrices(sampler.denoiser, sampler.ranks)) {
-    for (size_t k = 0; k < size_t{matrix.rows} * matrix.columns; ++k)
-      matrices.push_back(static_cast<int8_t>(int(k * 53 + rows) % 255 - 127));
-    rows += matrix.rows;
-  }
-  for (size_t n = 0; n < rows; ++n) row_scale.push_back(0x1p-10f * static_cast<float>(n % 3 + 1));
-  bias = patterned(rows);
-  position = patterned((tokens.size() + 1) * sampler.denoiser.d_model);
+  fill_denoiser(tokens.size());
   sampler.mean = mean;
   sampler.directions = directions;
   sampler.direction_scale = direction_scale;

@@ -131,6 +131,9 @@ struct SamplerSample {
   Result<std::vector<std::byte>> write() const {
     return write_sampler({.sampler = &sampler, .budget = budget, .provenance = make_provenance()});
   }
+
+ protected:
+  void fill_denoiser(size_t tokens);  // matrices, their scales and biases, positions
 };
 
 // Samples the static parts of avatars of one network, antialiased: a token of the shape, four of

@@ -80,7 +80,7 @@ TEST(StaticPopulation, IntegersAndScalesComeBackAsTheyWere) {
       }
       for (size_t i = 0; i < out.network.layers.size(); ++i) {
         const Layer& shared = sample.initial->avatar.network.layers[i];
-        const auto &weights = out.network.layers[i].weights;
+        const auto& weights = out.network.layers[i].weights;
         if (coding == DifferenceCoding::kNone) {
           EXPECT_TRUE(same(weights, shared.weights));
           EXPECT_TRUE(same(out.network.layers[i].bias, shared.bias));
@@ -118,7 +118,8 @@ TEST(StaticPopulation, MapsNearTheMeanTakeFewerBytesThanTheyAre) {
     near.avatars[m]->avatar.static_part.groups[0].values = near.avatars[m]->geometry;
     near.avatars[m]->avatar.static_part.groups[0].scale = near.avatars[m]->geometry_scale;
   }
-  const Opened like = open_or_die(near.write()), unlike = open_or_die(StaticPopulationSample().write());
+  const Opened like = open_or_die(near.write()),
+               unlike = open_or_die(StaticPopulationSample().write());
   EXPECT_LT(like.package.population().static_code.size(),
             unlike.package.population().static_code.size());
 }
@@ -152,10 +153,9 @@ TEST(StaticPopulation, NamesTheMemberThatDiffers) {
                  StatusCode::kMismatch);
   expect_refused(bent([](StaticPopulationSample& s) { s.population.shared = nullptr; }),
                  "a shared avatar goes with", StatusCode::kInvalidArgument);
-  expect_refused(bent([](StaticPopulationSample& s) {
-                   s.population.coding = DifferenceCoding::kInt8;
-                 }),
-                 "a shared avatar goes with", StatusCode::kInvalidArgument);
+  expect_refused(
+      bent([](StaticPopulationSample& s) { s.population.coding = DifferenceCoding::kInt8; }),
+      "a shared avatar goes with", StatusCode::kInvalidArgument);
 }
 
 Status bent_parts(const std::function<void(PackageParts&, Population&)>& bend) {
@@ -214,10 +214,9 @@ TEST(PackageStaticPopulation, RejectsWhatCannotBe) {
   expect_refused(with_index([](Population& p) { p.static_part.groups[1].first_channel = 5; }),
                  "static part: group 1: another group has one of its channels");
   for (const uint64_t feature : {kFeatureStaticPart, kFeatureFilters}) {
-    expect_refused(bent_parts([&](PackageParts& parts, Population&) {
-                     parts.required_features &= ~feature;
-                   }),
-                   "header.required_features");
+    expect_refused(
+        bent_parts([&](PackageParts& parts, Population&) { parts.required_features &= ~feature; }),
+        "header.required_features");
   }
   for (const char* name :
        {"static.0.values", "static.1.scale", "population.static_scale",

@@ -41,8 +41,8 @@ TEST(StaticSampler, KeepsTheNetworkTheGroupsAndTheirPatches) {
   for (size_t i = 0; i < in.network.layers.size(); ++i) {
     EXPECT_TRUE(same(in.network.layers[i].weights, out.network.layers[i].weights));
     if (in.network.layers[i].op != LayerOp::kConv2d) continue;
-    EXPECT_TRUE(same(in.fixed_point.convolutions[i].weights,
-                     out.fixed_point.convolutions[i].weights));
+    EXPECT_TRUE(
+        same(in.fixed_point.convolutions[i].weights, out.fixed_point.convolutions[i].weights));
   }
   EXPECT_EQ(out.fixed_point.values, out.values);
   ASSERT_EQ(out.static_groups.size(), 2u);
@@ -139,12 +139,12 @@ TEST(PackageStaticSampler, RejectsWhatCannotBe) {
                  "static part: group 0: its grid");
   expect_refused(with_index([](Sampler& s) { s.antialiased = false; }), "the bit of filters");
   for (const uint64_t feature : {kFeatureFixedPoint, kFeatureStaticPart, kFeatureFilters}) {
-    expect_refused(bent_parts([&](PackageParts& parts, Sampler&) {
-                     parts.required_features &= ~feature;
-                   }),
-                   "header.required_features");
+    expect_refused(
+        bent_parts([&](PackageParts& parts, Sampler&) { parts.required_features &= ~feature; }),
+        "header.required_features");
   }
-  for (const char* name : {"network.0.weights", "fixed.0.scale", "static.0.scale", "static.1.row"}) {
+  for (const char* name :
+       {"network.0.weights", "fixed.0.scale", "static.0.scale", "static.1.row"}) {
     expect_refused(bent_parts([&](PackageParts& parts, Sampler&) {
                      std::erase_if(parts.blobs,
                                    [&](const BlobPart& blob) { return blob.name == name; });

@@ -482,29 +482,6 @@ TEST_F(CApi, SamplesAnAvatarAndDrawsIt) {
   EXPECT_OK(fig_package_close(on));
 }
 
-// Damage where drawing never looks is no hindrance; everywhere else it is found.
-TEST_F(CApi, OpensForDrawingWhatDrawingTakes) {
-  const AlignedBytes whole = read_sample("packages/person.fgn");
-  std::vector<std::byte> bytes(whole.bytes().begin(), whole.bytes().end());
-  const Result<Package> sound = Package::open(whole.bytes(), "sound");
-  ASSERT_TRUE(sound.ok()) << sound.status().message();
-  const auto* picture = reinterpret_cast<const std::byte*>(sound->avatar().golden.png.data());
-  bytes[static_cast<size_t>(picture - whole.bytes().data()) + 40] ^= std::byte{1};
-  const AlignedBytes bent(bytes);
-  fig_package_options options = fig_default_package_options();
-  fig_package package{};
-  EXPECT_REFUSED(fig_package_open(bent.bytes().data(), bent.bytes().size(), &options, &package),
-                 FIG_CORRUPT, "golden.png");
-  options.for_drawing = 1;
-  ASSERT_EQ(fig_package_open(bent.bytes().data(), bent.bytes().size(), &options, &package), FIG_OK)
-      << fig_last_message();
-  fig_package_info info = fig_default_package_info();
-  EXPECT_OK(fig_package_get_info(package, &info));
-  EXPECT_EQ(info.holds_q8, 1);
-  EXPECT_EQ(info.holds_f32, 0) << "fixed point alone where there are both";
-  EXPECT_OK(fig_package_close(package));
-}
-
 TEST_F(CApi, KeepsACopyWhereTheBytesGo) {
   std::vector<char> bytes(test_avatar.bytes.bytes().size() + 1);  // not at a multiple of 64
   char* const place = bytes.data() + (reinterpret_cast<uintptr_t>(bytes.data()) % 64 == 0 ? 1 : 0);

@@ -64,24 +64,26 @@ void make_shared_network(const Workshop& workshop, unsigned slots,
   const std::string captures = state.initial() + "/captures", run = state.initial() + "/run";
   const std::vector<Identity> people = learners(workshop.recipe, recipe.identities);
   SharedNetworkProgress at{.people = people.size()};
-  run_all({.what = "shared network", .slots = slots}, people.size(),
-          [&](size_t i) { return capture_identity(workshop, people[i], captures), std::string(); },
-          [&](size_t i) { return people[i].name(); },
-          [&](size_t finished) {
-            at.captured = finished;
-            show(at);
-          });
+  run_all(
+      {.what = "shared network", .slots = slots}, people.size(),
+      [&](size_t i) { return capture_identity(workshop, people[i], captures), std::string(); },
+      [&](size_t i) { return people[i].name(); },
+      [&](size_t finished) {
+        at.captured = finished;
+        show(at);
+      });
   at.captured = people.size();
   std::vector<std::string> folders;
   for (const Identity& person : people) folders.push_back(captures + "/" + person.name());
-  run_all({.what = "shared network", .slots = 1}, 1,
-          [&](size_t) { return train_together(workshop, folders, run, slots), std::string(); },
-          [&](size_t) { return workshop.recipe.name; },
-          [&](size_t) {
-            at.share = static_cast<double>(iterations_done({run})) /
-                       static_cast<double>(recipe.iterations);
-            show(at);
-          });
+  run_all(
+      {.what = "shared network", .slots = 1}, 1,
+      [&](size_t) { return train_together(workshop, folders, run, slots), std::string(); },
+      [&](size_t) { return workshop.recipe.name; },
+      [&](size_t) {
+        at.share =
+            static_cast<double>(iterations_done({run})) / static_cast<double>(recipe.iterations);
+        show(at);
+      });
   fs::remove_all(run);
   fs::remove_all(captures);
 }

@@ -40,18 +40,7 @@ class PackSampler : public testing::Test {
     tests::write_people(path("people.fgn"));
     ASSERT_TRUE(
         ports::write_file_atomically(path("body.fgn"), tests::make_test_body().bytes.bytes()).ok());
-    SamplerRequest request{.population = path("people.fgn"),
-                           .run = path("run"),
-                           .settings = {},
-                           .command = "test",
-                           .quiet = true};
-    request.settings.space = {.variant = Variant::kBasis, .rank = 8};
-    request.settings.shape = {
-        .token_sizes = {}, .d_model = 32, .blocks = 2, .heads = 4, .feed_forward = 64};
-    request.settings.batch = 8, request.settings.schedule.peak = 3e-3,
-    request.settings.schedule.ramp_iterations = 5;
-    request.settings.ema = 0.9;
-    request.settings.schedule.budget = {.iterations = 200, .seconds = 0};
+    SamplerRequest request = request_of("people.fgn", "run");
     train_sampler(request);
     request.run = path("layer"), request.settings.space.variant = Variant::kLayer,
     request.settings.schedule.budget.iterations = 2;
@@ -64,6 +53,21 @@ class PackSampler : public testing::Test {
     return folder;
   }
   static std::string path(const std::string& name) { return (folder() / name).string(); }
+  static SamplerRequest request_of(const std::string& population, const std::string& run) {
+    SamplerRequest request{.population = path(population),
+                           .run = path(run),
+                           .settings = {},
+                           .command = "test",
+                           .quiet = true};
+    request.settings.space = {.variant = Variant::kBasis, .rank = 8};
+    request.settings.shape = {
+        .token_sizes = {}, .d_model = 32, .blocks = 2, .heads = 4, .feed_forward = 64};
+    request.settings.batch = 8, request.settings.schedule.peak = 3e-3,
+    request.settings.schedule.ramp_iterations = 5;
+    request.settings.ema = 0.9;
+    request.settings.schedule.budget = {.iterations = 200, .seconds = 0};
+    return request;
+  }
   static PackSamplerOptions options() {
     return {.run = path("run"),
             .body = path("body.fgn"),
@@ -212,18 +216,7 @@ TEST_F(PackSampler, SeedsOfTheDeviceAreSeedsOfTheTrainersFloats) {
 // device makes the people that the trainer's floats make.
 TEST_F(PackSampler, OfOneNetworkSamplesMaps) {
   tests::write_people_of_one_network(path("alike.fgn"));
-  SamplerRequest request{.population = path("alike.fgn"),
-                         .run = path("alike"),
-                         .settings = {},
-                         .command = "test",
-                         .quiet = true};
-  request.settings.space = {.variant = Variant::kBasis, .rank = 8};
-  request.settings.shape = {
-      .token_sizes = {}, .d_model = 32, .blocks = 2, .heads = 4, .feed_forward = 64};
-  request.settings.batch = 8, request.settings.schedule.peak = 3e-3;
-  request.settings.schedule.ramp_iterations = 5;
-  request.settings.ema = 0.9;
-  request.settings.schedule.budget = {.iterations = 200, .seconds = 0};
+  SamplerRequest request = request_of("alike.fgn", "alike");
   try {
     train_sampler(request);
     FAIL() << "patches are the body's";

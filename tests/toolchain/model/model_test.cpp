@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "tests/toolchain/model/random_tensor.h"
 #include "tests/toolchain/model/synthetic_body.h"
 #include "toolchain/error.h"
 #include "toolchain/model/loss.h"
@@ -20,6 +21,9 @@
 
 namespace figurine::model::model_test {
 namespace {
+
+using testing_tools::random_tensor;
+using testing_tools::to_double;
 
 // The network's definition (figurine/network.h), evaluated value by value in double. input:
 // [T,T,C].
@@ -85,19 +89,6 @@ std::vector<double> evaluate(const Network& network, const std::vector<double>& 
     values.push_back(std::move(out));
   }
   return values.back();
-}
-
-torch::Tensor random_tensor(std::vector<int64_t> sizes, uint32_t seed) {
-  torch::Tensor tensor = torch::empty(sizes);
-  std::mt19937 random(seed);
-  std::normal_distribution<float> normal;
-  for (int64_t i = 0; i < tensor.numel(); ++i) tensor.data_ptr<float>()[i] = normal(random);
-  return tensor;
-}
-
-std::vector<double> to_double(const torch::Tensor& tensor) {
-  const float* data = tensor.const_data_ptr<float>();
-  return {data, data + tensor.numel()};
 }
 
 TEST(PoseUNet, HasThePapersParameterCountsAndTokenLengths) {

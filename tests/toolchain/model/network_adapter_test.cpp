@@ -5,31 +5,21 @@
 
 #include <cmath>
 #include <cstdio>
-#include <random>
 #include <string>
 
+#include "tests/toolchain/model/random_tensor.h"
 #include "toolchain/error.h"
 #include "toolchain/tensor_operations.h"
 
 namespace figurine::model::network_adapter_test {
 namespace {
 
+using testing_tools::random_tensor;
+using testing_tools::to_double;
+
 constexpr AdapterKind kKinds[] = {AdapterKind::kResidual, AdapterKind::kScale, AdapterKind::kBasis};
 
 Network small_network() { return make_pose_unet(16, 6, 4, head_channels(0)); }
-
-torch::Tensor random_tensor(std::vector<int64_t> sizes, uint32_t seed) {
-  torch::Tensor tensor = torch::empty(sizes);
-  std::mt19937 random(seed);
-  std::normal_distribution<float> normal;
-  for (int64_t i = 0; i < tensor.numel(); ++i) tensor.data_ptr<float>()[i] = normal(random);
-  return tensor;
-}
-
-std::vector<double> to_double(const torch::Tensor& tensor) {
-  const float* data = tensor.const_data_ptr<float>();
-  return {data, data + tensor.numel()};
-}
 
 // Of people whose kernels differ from the network's by noise.
 KernelBasis some_basis(const PoseUNet& unet, uint32_t rank) {

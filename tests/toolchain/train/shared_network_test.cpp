@@ -37,6 +37,19 @@ const std::string& run_of_both_parts() {
   return run;
 }
 
+// A finished run, made again in `run` with a stop in its middle.
+void expect_same_bits_after_a_stop(const TrainRequest& straight, const std::string& run) {
+  TrainRequest broken = straight;
+  broken.run = run;
+  broken.stop_after = 5;
+  EXPECT_THROW(train_avatar(broken), Interrupted);
+  broken.stop_after = 0;
+  broken.resume = true;
+  train_avatar(broken);
+  EXPECT_TRUE(bytes_of(RunDirectory{straight.run}.weights()) ==
+              bytes_of(RunDirectory{broken.run}.weights()));
+}
+
 TEST(Training, WithAFrozenNetworkMovesTheStaticValuesAlone) {
   const TemporaryFolder folder;
   TrainRequest straight = both_parts(folder.path("straight"), 12);
@@ -76,15 +89,7 @@ TEST(Training, OfALowRankResidualLeavesTheSumInTheKernelsAndBiasesAlone) {
   straight.settings.adapter.rank = 2;
   straight.settings.clip_gradient = 1e-2;
   train_avatar(straight);
-  TrainRequest broken = straight;
-  broken.run = folder.path("broken");
-  broken.stop_after = 5;
-  EXPECT_THROW(train_avatar(broken), Interrupted);
-  broken.stop_after = 0;
-  broken.resume = true;
-  train_avatar(broken);
-  EXPECT_TRUE(bytes_of(RunDirectory{straight.run}.weights()) ==
-              bytes_of(RunDirectory{broken.run}.weights()));
+  expect_same_bits_after_a_stop(straight, folder.path("broken"));
 
   const TensorFile first = read_tensor_file(RunDirectory{run_of_both_parts()}.weights()),
                    tuned = read_tensor_file(RunDirectory{straight.run}.weights()),
@@ -142,15 +147,7 @@ TEST(Training, OfABasisMovesKernelsInItsDirectionsAloneAndGoesOnWithThatBasisAlo
   straight.settings.freeze_network = true;
   straight.settings.adapter = {.kind = model::AdapterKind::kBasis, .rank = 2, .basis = basis};
   train_avatar(straight);
-  TrainRequest broken = straight;
-  broken.run = folder.path("broken");
-  broken.stop_after = 5;
-  EXPECT_THROW(train_avatar(broken), Interrupted);
-  broken.stop_after = 0;
-  broken.resume = true;
-  train_avatar(broken);
-  EXPECT_TRUE(bytes_of(RunDirectory{straight.run}.weights()) ==
-              bytes_of(RunDirectory{broken.run}.weights()));
+  expect_same_bits_after_a_stop(straight, folder.path("broken"));
 
   // Whatever a kernel changed by lies in its two directions.
   const TensorFile first = read_tensor_file(RunDirectory{run_of_both_parts()}.weights()),
