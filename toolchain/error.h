@@ -22,6 +22,13 @@ T value_or_throw(Result<T> result, const std::string& where) {
   return std::move(result).value();
 }
 
+// The same of an error that names the place itself.
+template <class T>
+T value_or_throw(Result<T> result) {
+  if (!result.ok()) throw InputError(result.status().message());
+  return std::move(result).value();
+}
+
 inline void throw_if_error(const Status& status, const std::string& where) {
   if (!status.ok()) throw InputError(where + ": " + status.message());
 }

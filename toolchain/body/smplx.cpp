@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "toolchain/body/npz.h"
+#include "ports/motion/npz.h"
 #include "toolchain/body/skin.h"
 #include "toolchain/error.h"
 
@@ -14,7 +14,7 @@ constexpr uint32_t kMaxCoefficients = 20;
 constexpr size_t kMaxVertices = 1 << 20;
 constexpr double kMaxCoordinate = 100;  // metres: a file in millimetres is not silently believed
 
-void check_range(const NpyArray& array, double low, double high, const std::string& where) {
+void check_range(const ports::NpyArray& array, double low, double high, const std::string& where) {
   for (size_t i = 0; i < array.values.size(); ++i) {
     if (!(array.values[i] >= low && array.values[i] <= high)) {
       throw InputError(where + ": value " + std::to_string(i) + " is " +
@@ -24,7 +24,7 @@ void check_range(const NpyArray& array, double low, double high, const std::stri
   }
 }
 
-void check_tree(const NpyArray& table, const std::string& where) {
+void check_tree(const ports::NpyArray& table, const std::string& where) {
   // The root's parent is bogus (2^32 - 1 in v1.0): whatever it is, it means -1.
   for (uint32_t j = 0; j < kJointCount; ++j) {
     const bool root = j == 0;
@@ -34,7 +34,7 @@ void check_tree(const NpyArray& table, const std::string& where) {
   }
 }
 
-std::vector<uint32_t> indices(const NpyArray& array) {
+std::vector<uint32_t> indices(const ports::NpyArray& array) {
   std::vector<uint32_t> out(array.values.size());
   std::transform(array.values.begin(), array.values.end(), out.begin(),
                  [](double value) { return static_cast<uint32_t>(value); });
@@ -43,7 +43,7 @@ std::vector<uint32_t> indices(const NpyArray& array) {
 
 // regressor [55,V] times one [V,3] array with a stride of `step` values between vertices and
 // components.
-JointPositions regress(const NpyArray& regressor, const std::vector<double>& values,
+JointPositions regress(const ports::NpyArray& regressor, const std::vector<double>& values,
                        size_t vertices, size_t first, size_t step) {
   JointPositions joints{};
   for (uint32_t j = 0; j < kJointCount; ++j) {
@@ -61,20 +61,21 @@ JointPositions regress(const NpyArray& regressor, const std::vector<double>& val
 }  // namespace
 
 BodyModel read_smplx(const std::string& path) {
-  const NpzFile file = NpzFile::open(path);
+  const ports::NpzFile file = value_or_throw(ports::NpzFile::open(path));
   const auto where = [&](const char* name) { return path + ": " + name; };
-  NpyArray positions = file.read("v_template", {0, 3});
+  ports::NpyArray positions = value_or_throw(file.read("v_template", {0, 3}));
   const size_t vertices = positions.shape[0];
   if (vertices < 3 || vertices > kMaxVertices)
     throw InputError(where("v_template") + ": " + std::to_string(vertices) + " vertices");
   check_range(positions, -kMaxCoordinate, kMaxCoordinate, where("v_template"));
-  const NpyArray faces = file.read("f", {0, 3});
-  const NpyArray uv_faces = file.read("ft", {faces.shape[0], 3});
-  const NpyArray uvs = file.read("vt", {0, 2});
-  const NpyArray directions = file.read("shapedirs", {vertices, 3, 0});
-  const NpyArray regressor = file.read("J_regressor", {kJointCount, vertices});
-  const NpyArray weights = file.read("weights", {vertices, kJointCount});
-  check_tree(file.read("kintree_table", {2, kJointCount}), where("kintree_table"));
+  const ports::NpyArray faces = value_or_throw(file.read("f", {0, 3}));
+  const ports::NpyArray uv_faces = value_or_throw(file.read("ft", {faces.shape[0], 3}));
+  const ports::NpyArray uvs = value_or_throw(file.read("vt", {0, 2}));
+  const ports::NpyArray directions = value_or_throw(file.read("shapedirs", {vertices, 3, 0}));
+  const ports::NpyArray regressor =
+      value_or_throw(file.read("J_regressor", {kJointCount, vertices}));
+  const ports::NpyArray weights = value_or_throw(file.read("weights", {vertices, kJointCount}));
+  check_tree(value_or_throw(file.read("kintree_table", {2, kJointCount})), where("kintree_table"));
   check_range(faces, 0, static_cast<double>(vertices) - 1, where("f"));
   check_range(uv_faces, 0, static_cast<double>(uvs.shape[0]) - 1, where("ft"));
   check_range(uvs, 0, 1, where("vt"));

@@ -104,7 +104,7 @@ Reached place_poses(Session& session, const Body& body) {
 }
 
 Session prepare(const CaptureRequest& request, uint32_t identity, const Package& package,
-                const body::MakeHuman* makehuman, const std::vector<body::MotionClip>& motions) {
+                const body::MakeHuman* makehuman, const std::vector<ports::MotionClip>& motions) {
   const Body& body = package.body();
   Session session;
   const PersonRequest person{.seed = person_seed(request.seed, identity), .limits = request.limits};
@@ -207,7 +207,7 @@ std::string identity_name(uint32_t identity) {
 }
 
 CaptureEnd capture_identities(const CaptureRequest& request, const Package& package,
-                              const std::vector<body::MotionClip>& motions,
+                              const std::vector<ports::MotionClip>& motions,
                               const CaptureCallback& callback) {
   const Body& body = package.body();
   std::optional<body::MakeHuman> makehuman;

@@ -12,7 +12,7 @@
 
 #include "figurine/package.h"
 #include "ports/media/image.h"
-#include "toolchain/body/motion_clip.h"
+#include "ports/motion/motion_clip.h"
 #include "toolchain/capture/camera_rings.h"
 #include "toolchain/capture/folds.h"
 #include "toolchain/capture/wardrobe.h"
@@ -50,7 +50,7 @@ enum class CaptureEnd : uint8_t { kComplete, kStopped };
 // body: an opened body package named "makehuman" or "mannequin". InputError on anything unusable,
 // before the first file is written where possible.
 CaptureEnd capture_identities(const CaptureRequest& request, const Package& body,
-                              const std::vector<body::MotionClip>& motions,
+                              const std::vector<ports::MotionClip>& motions,
                               const CaptureCallback& callback);
 
 // PersonRequest::seed of an identity, by the request's seed.

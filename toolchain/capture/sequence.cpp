@@ -21,10 +21,10 @@ constexpr uint64_t kHeadingStream = 3;
 
 }  // namespace
 
-std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& motions,
+std::vector<CapturedPose> make_sequence(const std::vector<ports::MotionClip>& motions,
                                         const SequenceOptions& options) {
   uint32_t total = 0;
-  for (const body::MotionClip& motion : motions) total += motion.frame_count;
+  for (const ports::MotionClip& motion : motions) total += motion.frame_count;
   if (total < options.frames) {
     throw InputError("--frames: " + std::to_string(options.frames) +
                      " asked for, the motions have " + std::to_string(total));
@@ -62,7 +62,7 @@ std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& mot
     captured.motion_frame = at;
     const double turns = in_block ? block_heading : start + i * kHeadingStep;
     captured.heading_rad = static_cast<float>((turns - std::floor(turns)) * 2 * std::numbers::pi);
-    captured.pose = body::turned(motions[clip].pose(at), captured.heading_rad);
+    captured.pose = ports::turned(motions[clip].pose(at), captured.heading_rad);
     captured.pose.root_translation_m[0] = -options.root_rest_m[0];
     captured.pose.root_translation_m[2] = -options.root_rest_m[2];
     sequence.push_back(std::move(captured));

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "toolchain/body/motion_clip.h"
+#include "ports/motion/motion_clip.h"
 #include "toolchain/dataset/dataset.h"
 
 namespace figurine::capture {
 
 struct CapturedPose {
-  body::OwnedPose pose;  // root joint over the origin (x = z = 0), its height as in the motion
+  ports::OwnedPose pose;  // root joint over the origin (x = z = 0), its height as in the motion
   dataset::FrameSplit split = dataset::FrameSplit::kTrain;
   std::string motion;
   uint32_t motion_frame = 0;
@@ -34,7 +34,7 @@ struct SequenceOptions {
 // Every pose outside the block gets its own heading (irrational steps: any run of poses covers the
 // circle, and so do the held-out ones); the block keeps one, so that it is a piece of real motion.
 // InputError if the motions have fewer frames than asked for.
-std::vector<CapturedPose> make_sequence(const std::vector<body::MotionClip>& motions,
+std::vector<CapturedPose> make_sequence(const std::vector<ports::MotionClip>& motions,
                                         const SequenceOptions& options);
 
 }  // namespace figurine::capture

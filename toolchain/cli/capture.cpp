@@ -13,7 +13,7 @@
 #include "ports/host/cpus.h"
 #include "ports/host/files.h"
 #include "ports/media/png.h"
-#include "toolchain/body/clip.h"
+#include "ports/motion/clip.h"
 #include "toolchain/capture/capture.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
@@ -133,11 +133,11 @@ void run_capture(CaptureOptions options) {
     }
     options.motions = {kDefaultMotion};
   }
-  std::vector<body::MotionClip> motions;
+  std::vector<ports::MotionClip> motions;
   for (const std::string& path : options.motions) {
-    motions.push_back(body::read_clip(path, package.body(),
-                                      {.name = std::filesystem::path(path).stem().string()}));
-    const std::string source = body::clip_source(path);
+    motions.push_back(value_or_throw(ports::read_clip(
+        path, package.body(), {.name = std::filesystem::path(path).stem().string()})));
+    const std::string source = value_or_throw(ports::clip_source(path));
     // Once, however many motions come from the same clip.
     const bool known =
         std::find(request.sources.begin(), request.sources.end(), source) != request.sources.end();

@@ -8,7 +8,7 @@
 #include <map>
 
 #include "ports/host/files.h"
-#include "toolchain/body/npz.h"
+#include "ports/motion/npz.h"
 #include "toolchain/error.h"
 #include "toolchain/features/perceptual_embedding.h"
 #include "toolchain/model/convolution.h"
@@ -60,7 +60,7 @@ class NamedArrays {
  public:
   explicit NamedArrays(const std::string& path) : path_(path) {
     if (std::filesystem::path(path).extension() == ".npz") {
-      npz_ = std::make_unique<body::NpzFile>(body::NpzFile::open(path));
+      npz_ = std::make_unique<ports::NpzFile>(value_or_throw(ports::NpzFile::open(path)));
       return;
     }
     const torch::jit::Module module = load_script(path);
@@ -71,7 +71,7 @@ class NamedArrays {
   torch::Tensor read(const std::string& name, const std::vector<int64_t>& shape) const {
     torch::Tensor tensor;
     if (npz_) {
-      const body::NpyArray array = npz_->read(name, {shape.begin(), shape.end()});
+      const ports::NpyArray array = value_or_throw(npz_->read(name, {shape.begin(), shape.end()}));
       tensor = torch::tensor(array.values, torch::kFloat64).view(shape).to(torch::kFloat32);
     } else {
       const auto found = script_.find(name);
@@ -89,7 +89,7 @@ class NamedArrays {
 
  private:
   std::string path_;
-  std::unique_ptr<body::NpzFile> npz_;
+  std::unique_ptr<ports::NpzFile> npz_;
   std::map<std::string, torch::Tensor> script_;
 };
 

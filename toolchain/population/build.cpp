@@ -9,8 +9,8 @@
 
 #include "formats/writer/package_writer.h"
 #include "ports/host/files.h"
+#include "ports/motion/clip.h"
 #include "toolchain/body/atlas.h"
-#include "toolchain/body/clip.h"
 #include "toolchain/body/makehuman_model.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/texel_body.h"
@@ -87,7 +87,7 @@ void make_body(const Recipe& recipe, const BuildOptions& options, const State& s
 }
 
 struct Motions {
-  std::vector<body::MotionClip> clips;
+  std::vector<ports::MotionClip> clips;
   std::vector<std::string> sources;
 };
 
@@ -99,10 +99,10 @@ Motions read_motions(const Recipe& recipe, const std::string& recipe_path, const
       throw InputError(recipe_path + ": motions: " + piece.clip +
                        ": start and frames are for clips, this is a motion package");
     }
-    body::RetargetOptions retarget;
+    ports::RetargetOptions retarget;
     retarget.name = piece.name, retarget.start = piece.start, retarget.frames = piece.frames;
-    motions.clips.push_back(body::read_clip(path, body, retarget));
-    const std::string source = body::clip_source(path);
+    motions.clips.push_back(value_or_throw(ports::read_clip(path, body, retarget)));
+    const std::string source = value_or_throw(ports::clip_source(path));
     if (std::find(motions.sources.begin(), motions.sources.end(), source) == motions.sources.end())
       motions.sources.push_back(source);
   }

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "toolchain/body/motion_clip.h"
+#include "ports/motion/motion_clip.h"
 #include "toolchain/population/recipe.h"
 #include "toolchain/population/state.h"
 #include "toolchain/train/package_file.h"
@@ -20,7 +20,7 @@ struct Workshop {
   const Recipe& recipe;
   const State& state;
   const train::PackageFile& body;
-  const std::vector<body::MotionClip>& motions;
+  const std::vector<ports::MotionClip>& motions;
   const std::vector<std::string>& sources;  // of the motions
   std::string makehuman;
 };

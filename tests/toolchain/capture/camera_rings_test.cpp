@@ -86,8 +86,8 @@ TEST(CameraRings, ABustRingHoldsHeadsButForRarePoses) {
   EXPECT_LE(inside, 6 * 198u) << "crouching poses would need cameras from further away";
 }
 
-body::MotionClip counting_clip(uint32_t frames) {
-  body::MotionClip clip;
+ports::MotionClip counting_clip(uint32_t frames) {
+  ports::MotionClip clip;
   clip.name = "counting";
   clip.frame_count = frames;
   for (uint32_t f = 0; f < frames; ++f) {

@@ -42,8 +42,8 @@ const Package& mannequin() {
 }
 
 // Everything moves: legs and arms swing, the trunk sways, fingers curl.
-body::MotionClip swinging_clip(uint32_t frames) {
-  body::MotionClip clip;
+ports::MotionClip swinging_clip(uint32_t frames) {
+  ports::MotionClip clip;
   clip.name = "swinging";
   clip.frame_count = frames;
   for (uint32_t f = 0; f < frames; ++f) {

@@ -6,8 +6,8 @@
 #include "formats/writer/package_writer.h"
 #include "gtest/gtest.h"
 #include "ports/host/files.h"
+#include "ports/motion/glb_builder.h"
 #include "samples/program.h"
-#include "toolchain/body/glb_builder.h"
 #include "toolchain/body/mannequin.h"
 #include "toolchain/body/texel_body.h"
 
@@ -56,10 +56,10 @@ TEST(MotionCommand, AnEmoteBecomesAPackageThatSaysWhereItIsFrom) {
 TEST(MotionCommand, BadFilesGiveOneLineAndNothingElse) {
   const TestFolder folder;
   write_body(folder);
-  body::test::GlbBuilder still;
+  ports::tests::GlbBuilder still;
   still.node("Avatar_Hips", -1);
   still.json.erase("animations");
-  body::test::GlbBuilder strange;
+  ports::tests::GlbBuilder strange;
   strange.track(strange.node("tail", -1), "translation", "LINEAR", {0, 1}, {0, 0, 0, 1, 1, 1});
   const auto bytes = ports::MappedFile::open(emote("walk.glb"));
   ASSERT_TRUE(bytes.ok()) << bytes.status().message();
@@ -71,16 +71,16 @@ TEST(MotionCommand, BadFilesGiveOneLineAndNothingElse) {
   folder.write("still.glb", still.file());
   folder.write("strange.glb", strange.file());
   folder.write("walk.glb", whole);
-  folder.write("walk.gltf", whole);
+  folder.write("walk.fbx", whole);
   const std::vector<std::string> before = folder.names();
   for (const auto& [arguments, wanted] :
        {std::pair{"none.glb", "none.glb"},
         {"empty.glb", "empty.glb: header: the file ends early"},
         {"half.glb", "half.glb: header: length: "},
-        {"text.glb", "text.glb: header: magic: not a binary glTF file"},
+        {"text.glb", "text.glb: header: magic: not a glTF file"},
         {"still.glb", "still.glb: animations: there are none"},
-        {"strange.glb", "strange.glb: nodes: no joint has a known name"},
-        {"walk.gltf", "walk.gltf: unsupported: a motion is a .bvh, .npz or .glb clip"},
+        {"strange.glb", "strange.glb: no joint has a known name"},
+        {"walk.fbx", "walk.fbx: unsupported: a motion is a .bvh, .npz, .glb, .gltf"},
         {"walk.glb --animation 1", "walk.glb: animations: no number 1: there are 1"},
         {"walk.glb --start 500", "walk.glb: start 500: the clip has 32 frames"}}) {
     const ProgramRun run = motion(folder, arguments);

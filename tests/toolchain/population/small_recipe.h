@@ -7,7 +7,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "ports/host/files.h"
-#include "toolchain/body/motion_clip.h"
+#include "ports/motion/motion_clip.h"
 #include "toolchain/body/skeleton.h"
 #include "toolchain/error.h"
 
@@ -39,7 +39,7 @@ inline nlohmann::json small_shared_recipe() {
 
 // Its motion, which lies beside it.
 inline void write_swinging_motion(const std::string& path) {
-  body::MotionClip clip;
+  ports::MotionClip clip;
   clip.name = "swinging";
   clip.frame_count = 40;
   for (uint32_t f = 0; f < clip.frame_count; ++f) {

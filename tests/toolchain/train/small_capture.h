@@ -47,8 +47,8 @@ struct SmallCapture {
 
  private:
   // Legs and arms swing, the trunk sways, fingers curl.
-  static body::MotionClip swinging_clip(uint32_t frames) {
-    body::MotionClip clip;
+  static ports::MotionClip swinging_clip(uint32_t frames) {
+    ports::MotionClip clip;
     clip.name = "swinging";
     clip.frame_count = frames;
     for (uint32_t f = 0; f < frames; ++f) {
