@@ -259,12 +259,14 @@ void smooth(RetargetSource& source, double sigma_frames) {
 }
 
 // How many frames of the result lie within so many steps of the source, the first one included.
-// Frame times are written with a few digits: a rate that is one of the result's to 5e-4 counts as
-// that, so that the last frame is not lost to the missing digits.
+// Frame times are written with a few digits: a rate that is a multiple or a fraction of the
+// result's to 5e-4 counts as that, and else a frame that is missed by as little, so that the last
+// frame is not lost to the missing digits.
 uint32_t frames_within(uint32_t source_steps, double step) {
   const double whole = step >= 1 ? std::round(step) : 1 / std::round(1 / step);
   if (std::abs(step / whole - 1) < 5e-4) step = whole;
-  return static_cast<uint32_t>(source_steps / step + 1e-6) + 1;
+  const double frames = source_steps / step;
+  return static_cast<uint32_t>(frames + std::clamp(5e-4 * frames, 1e-6, 0.05)) + 1;
 }
 
 }  // namespace

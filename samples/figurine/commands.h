@@ -22,6 +22,7 @@ Command add_render_command(CLI::App& app);
 Command add_live_command(CLI::App& app);
 Command add_splat_command(CLI::App& app);
 Command add_export_command(CLI::App& app);
+Command add_motion_command(CLI::App& app);
 Command add_pose_command(CLI::App& app);
 Command add_bench_command(CLI::App& app);
 Command add_report_command(CLI::App& app);

@@ -16,11 +16,11 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "figurine " FIGURINE_VERSION);
   try {
     const samples::Command commands[] = {
-        samples::add_sample_command(app),  samples::add_render_command(app),
-        samples::add_splat_command(app),   samples::add_export_command(app),
-        samples::add_pose_command(app),    samples::add_live_command(app),
-        samples::add_bench_command(app),   samples::add_report_command(app),
-        samples::add_selftest_command(app)};
+        samples::add_sample_command(app), samples::add_render_command(app),
+        samples::add_splat_command(app),  samples::add_export_command(app),
+        samples::add_motion_command(app), samples::add_pose_command(app),
+        samples::add_live_command(app),   samples::add_bench_command(app),
+        samples::add_report_command(app), samples::add_selftest_command(app)};
     app.parse(argc, argv);
     samples::catch_interrupts();
     for (const samples::Command& command : commands) {
