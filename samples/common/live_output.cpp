@@ -13,6 +13,7 @@
 #include "samples/common/pose_feed.h"
 #include "samples/common/progress.h"
 #include "samples/common/v4l2_sink.h"
+#include "samples/common/window_sink.h"
 #include "samples/common/y4m_pipe.h"
 
 namespace figurine::samples {
@@ -21,21 +22,25 @@ namespace {
 
 constexpr uint64_t kAsk_ns = 20'000'000;  // how often a FIFO is asked for its reader
 
-enum class Target { kStandardOutput, kVideoDevice, kFile, kStream };
+enum class Target { kStandardOutput, kWindow, kVideoDevice, kFile, kStream };
 
 Result<Target> target_of(const std::string& name) {
   const auto unsupported = [&](const std::string& why) {
     return Status(StatusCode::kUnsupported, name + ": " + why);
   };
   if (name == "-") return Target::kStandardOutput;
-  if (name == "window") return unsupported("there is no window in this build");
+  if (name == "window") {
+    FIG_RETURN_IF_ERROR(ports::Window::available());
+    return Target::kWindow;
+  }
   if (name.starts_with("/dev/video")) return Target::kVideoDevice;
   struct stat there{};
   const bool exists = ::stat(name.c_str(), &there) == 0;
   if (exists && (S_ISFIFO(there.st_mode) || S_ISCHR(there.st_mode))) return Target::kStream;
   if (exists && !S_ISREG(there.st_mode)) return unsupported("neither a file, a FIFO nor a device");
   if (!name.ends_with(".y4m"))
-    return unsupported("live video goes to - (standard output), /dev/videoN, a FIFO or x.y4m");
+    return unsupported(
+        "live video goes to - (standard output), window, /dev/videoN, a FIFO or x.y4m");
   return Target::kFile;
 }
 
@@ -67,6 +72,13 @@ Result<LiveOutput> LiveOutput::open(const std::string& name, const Options& opti
         V4l2Sink::open(name, options.size, {.frames_per_second = options.frames_per_second});
     if (!device.ok()) return device.status();
     output.sink_ = std::move(*device);
+    return output;
+  }
+  if (*target == Target::kWindow) {
+    Result<std::unique_ptr<WindowSink>> window =
+        WindowSink::open(options.size, {.frames_per_second = options.frames_per_second});
+    if (!window.ok()) return window.status();
+    output.sink_ = std::move(*window);
     return output;
   }
   int descriptor = STDOUT_FILENO;

@@ -1,6 +1,6 @@
-// Where live frames go, by its name: "-" (y4m on standard output), a video device, a FIFO or
-// another thing that bytes can be written to, a file x.y4m, which appears whole when the run ends
-// or not at all.
+// Where live frames go, by its name: "-" (y4m on standard output), "window", a video device, a
+// FIFO or another thing that bytes can be written to, a file x.y4m, which appears whole when the
+// run ends or not at all.
 #pragma once
 
 #include <memory>

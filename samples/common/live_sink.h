@@ -44,6 +44,9 @@ class LiveSink {
   // receiver until the next frame is due, no longer; not for the frame's own time: pace is the
   // caller's. Error: the receiver is gone.
   Result<bool> show(const RenderedFrame& frame, uint64_t due_ns);
+  // Whether who watches wants no more of it, which is no error: a window that was closed. Once for
+  // every frame that is due; a window takes in there what its user did.
+  virtual bool closed() { return false; }
   // Gives the receiver what it has begun to take. Call once, at the end.
   virtual Status finish() { return {}; }
 

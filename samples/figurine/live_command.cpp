@@ -252,9 +252,10 @@ Command add_live_command(CLI::App& app) {
                    "performer over UDP; or -, a line of JSON a pose (docs/poses.md)")
       ->required();
   command
-      ->add_option("-o,--output", options->output,
-                   "- (y4m on standard output), /dev/videoN (docs/virtual_camera.md), a FIFO, or "
-                   "x.y4m (docs/live.md)")
+      ->add_option(
+          "-o,--output", options->output,
+          "window, - (y4m on standard output), /dev/videoN (docs/virtual_camera.md), a FIFO, or "
+          "x.y4m (docs/live.md)")
       ->required();
   command->add_option("--fps", options->frames_per_second, "frames a second")
       ->check(CLI::Range(1.0, 240.0))

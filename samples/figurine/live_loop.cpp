@@ -46,6 +46,10 @@ Status run_ticks(LiveLoop& loop, LiveRun& run) {
     const uint64_t due_ns = start_ns + static_cast<uint64_t>(std::llround(time_s * 1e9));
     FIG_RETURN_IF_ERROR(wait_until(due_ns));
     run.seconds = static_cast<double>(ports::now_ns() - start_ns) * 1e-9;
+    if (loop.sink.closed()) {
+      run.end = LiveEnd::kClosed;
+      return {};
+    }
     if (loop.sink.drop_late(due_ns)) continue;
     if (loop.feed != nullptr) {
       FIG_RETURN_IF_ERROR(loop.feed->advance(ports::now_ns()));
@@ -86,6 +90,8 @@ const char* to_string(LiveEnd end) {
       return "frames";
     case LiveEnd::kPoses:
       return "poses";
+    case LiveEnd::kClosed:
+      return "closed";
     case LiveEnd::kInterrupt:
       return "interrupt";
     case LiveEnd::kError:

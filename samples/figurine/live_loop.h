@@ -33,7 +33,7 @@ struct LiveLoop {
   std::optional<uint64_t> ticks;  // so many, dropped ones counted; none: until told otherwise
 };
 
-enum class LiveEnd : uint8_t { kTicks, kPoses, kInterrupt, kError };
+enum class LiveEnd : uint8_t { kTicks, kPoses, kClosed, kInterrupt, kError };
 const char* to_string(LiveEnd end);
 
 struct LiveRun {

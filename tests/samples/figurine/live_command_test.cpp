@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "samples/figurine/live_loop.h"
 #include "samples/program.h"
 
 namespace figurine::tests::live_command_test {
@@ -177,6 +178,71 @@ TEST_F(LiveCommand, AnInterruptEndsItWithAWholeFile) {
   }
 }
 
+#ifdef FIGURINE_HAS_WINDOW
+// SDL's dummy display is a window that nobody sees.
+constexpr const char* kDummy = "SDL_VIDEODRIVER=dummy SDL_RENDER_DRIVER=software ";
+
+TEST_F(LiveCommand, AWindowShowsTheFrames) {
+  const ProgramRun result = run("--pose motion.fgn --fps 8 --frames 4 --json live.json -o window",
+                                {.environment = kDummy});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json said = json();
+  EXPECT_EQ(said["ended_by"], "frames");
+  EXPECT_EQ(said["pixel_format"], "rgba8");
+  EXPECT_GT(said["shown_frames"], 0);
+  EXPECT_EQ(said["shown_frames"].get<int>() + said["dropped_frames"].get<int>(), 4);
+  EXPECT_EQ(result.error_lines(), 1u) << result.err;
+}
+
+TEST_F(LiveCommand, AnInterruptEndsAWindow) {
+  const ProgramRun result =
+      run("--pose motion.fgn --fps 10 --json live.json -o window",
+          {.before = std::string(kDummy) + "timeout --preserve-status -s INT 1"});
+  EXPECT_EQ(result.exit_code, 130) << result.err;
+  EXPECT_EQ(json()["ended_by"], "interrupt");
+}
+
+TEST_F(LiveCommand, AWindowWithoutADisplayIsOneLine) {
+  const ProgramRun result = run("--pose motion.fgn --frames 4 -o window",
+                                {.environment = "SDL_VIDEODRIVER=x11 DISPLAY= "});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.error_lines(), 1u) << result.err;
+  EXPECT_NE(result.err.find("window: there is no display"), std::string::npos) << result.err;
+}
+#endif
+
+// Somebody who has seen enough after two frames.
+class TwoFrames final : public samples::LiveSink {
+ public:
+  TwoFrames() : LiveSink({.frames_per_second = 100}) {}
+  PixelFormat format() const override { return PixelFormat::kRgba8; }
+  bool closed() override { return counts().shown == 2; }
+
+ private:
+  Result<bool> put(const samples::RenderedFrame&, uint64_t) override { return true; }
+};
+
+TEST_F(LiveCommand, AWindowThatIsClosedEndsItWithoutAnError) {
+  auto scene = samples::Scene::load({.avatars = {folder_.path("avatar.fgn")}});
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  auto renderer = Renderer::create({});
+  ASSERT_TRUE(renderer.ok());
+  ASSERT_TRUE(scene->add_to(**renderer, std::nullopt).ok());
+  TwoFrames sink;
+  Camera camera = scene->avatar(0).avatar.golden.camera;
+  samples::LiveLoop loop{.scene = *scene,
+                         .renderer = **renderer,
+                         .sink = sink,
+                         .camera = samples::FollowCamera(camera, {0, 0, 0}, false),
+                         .size = {camera.width_px, camera.height_px},
+                         .frames_per_second = 100};
+  const samples::LiveRun run = samples::run_live(loop);
+  EXPECT_EQ(run.end, samples::LiveEnd::kClosed);
+  EXPECT_STREQ(to_string(run.end), "closed");
+  EXPECT_TRUE(run.status.ok());
+  EXPECT_EQ(sink.counts().shown, 2u);
+}
+
 TEST_F(LiveCommand, AFullDiskLeavesNothing) {
   const ProgramRun result = run("--pose motion.fgn --fps 30 --frames 30 -o x.y4m",
                                 {.before = "trap '' XFSZ; ulimit -f 4;"});
@@ -202,7 +268,10 @@ TEST_F(LiveCommand, BadInputGetsOneLineAndNoFile) {
   refused("--pose vmc://nowhere:1 -o x.y4m", 1, "the address is none of IPv4");
   refused("--pose vmc:39539 -o x.y4m", 1, "not vmc://");
   refused("--pose motion.fgn -o x.mp4", 1, "x.mp4: live video goes to");
-  refused("--pose motion.fgn -o window", 1, "no window in this build");
+#ifndef FIGURINE_HAS_WINDOW
+  refused("--pose motion.fgn -o window", 1,
+          "window: this build has none: it was made without SDL2");
+#endif
   refused("--pose motion.fgn -o /dev/video7777", 1, "/dev/video7777: cannot be opened for writing");
   refused("--pose motion.fgn -o no/such/x.y4m", 1, "no/such/x.y4m");
   refused("--pose motion.fgn -o .", 1, "neither a file");
