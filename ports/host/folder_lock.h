@@ -11,8 +11,9 @@ namespace figurine::ports {
 class FolderLock {
  public:
   // The folder must exist. kIo, naming it, if another lock holds it, in this process or in another
-  // one. File systems without locks (some network ones) give one that holds nobody off.
-  static Result<FolderLock> acquire(const std::string& folder);
+  // one, for all of patience_s. File systems without locks (some network ones) give one that holds
+  // nobody off. A process that is forked holds it, too, until it ends.
+  static Result<FolderLock> acquire(const std::string& folder, double patience_s = 0);
   FolderLock(FolderLock&& other) noexcept;
   FolderLock& operator=(FolderLock&& other) noexcept;
   ~FolderLock();

@@ -29,9 +29,9 @@ class Progress {
   Clock::time_point last_{};
 };
 
-// From here on SIGINT and SIGTERM are only noted; long loops ask for the note and leave with
-// kInterrupted, so that destructors remove what is half done. SIGPIPE is ignored: a reader that
-// goes away is an error of write().
+// From here on SIGINT, SIGTERM and, unless it is ignored (nohup), SIGHUP are only noted; long loops
+// ask for the note and leave with kInterrupted, so that destructors remove what is half done.
+// SIGPIPE is ignored: a reader that goes away is an error of write().
 void catch_interrupts();
 Status check_interrupt();
 // Ends the process the way the noted signal would have, so that shells and scripts see the truth.

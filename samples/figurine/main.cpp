@@ -1,15 +1,19 @@
 // figurine: avatars and Gaussians on this device.
 //
-// Exit codes: 0 done, 1 bad input (one line naming file, field and reason; no output file), 2
-// usage, 3 a bug of figurine. An interrupt ends the process the way the signal would have.
+// Exit codes: 0 done, 1 bad input (one line naming file, field and reason; no output file) or a
+// lost standard output, 2 usage, 3 a bug of figurine. An interrupt ends the process the way the
+// signal would have.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 
+#include "ports/host/process.h"
 #include "samples/common/progress.h"
 #include "samples/figurine/commands.h"
 
-int main(int argc, char** argv) {
+namespace {
+
+int run(int argc, char** argv) {
   using namespace figurine;
   CLI::App app{"figurine: samples and renders pose-driven Gaussian avatars on a CPU"};
   app.require_subcommand(1);
@@ -44,4 +48,15 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "figurine: internal error: %s\n", error.what());
     return 3;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  figurine::ports::prepare_process("figurine");
+  const int code = run(argc, argv);
+  const figurine::Status printed = figurine::ports::flush_standard_output();
+  if (code != 0 || printed.ok()) return code;
+  std::fprintf(stderr, "figurine: %s\n", printed.message().c_str());
+  return 1;
 }

@@ -1,8 +1,8 @@
 // figurine-inspect: what a package is, what a device needs for it, where it came from; on the
 // reader alone. Of a file of Gaussians, what is read of it.
 //
-// Exit 0 if every package named is sound, 1 if one is not (the reason on stderr, one line), 2 on
-// wrong usage.
+// Exit 0 if every package named is sound, 1 if one is not or what was printed is lost (the reason
+// on stderr, one line), 2 on wrong usage.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
@@ -10,6 +10,7 @@
 
 #include "ports/gaussians/gaussian_file.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "samples/inspect/describe.h"
 #include "samples/inspect/print.h"
 
@@ -110,9 +111,7 @@ Status inspect(const Options& options) {
   return {};
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app{
       "figurine-inspect: prints what a .fgn package is, what it needs and where it came from; of a "
       "file of Gaussians, what is read of it"};
@@ -143,4 +142,15 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "figurine-inspect: internal error: %s\n", error.what());
     return 3;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  figurine::ports::prepare_process("figurine-inspect");
+  const int code = run(argc, argv);
+  const Status printed = figurine::ports::flush_standard_output();
+  if (code != 0 || printed.ok()) return code;
+  std::fprintf(stderr, "figurine-inspect: %s\n", printed.message().c_str());
+  return 1;
 }

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "ports/host/atomic_file.h"
 #include "ports/host/files.h"
 #include "ports/media/jpeg.h"
 #include "ports/media/png.h"
@@ -48,16 +49,9 @@ void write_bytes(const std::string& path, std::span<const std::byte> bytes) {
 // waiting for the disk. finish() syncs them together, before figurine.json calls the capture
 // complete.
 void write_unsynced(const std::string& path, std::span<const std::byte> bytes) {
-  const std::string temporary = path + ".tmp";
-  std::FILE* file = std::fopen(temporary.c_str(), "wb");
-  if (file == nullptr) throw InputError(temporary + ": " + std::strerror(errno));
-  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
-  const int write_error = errno;
-  const bool closed = std::fclose(file) == 0;
-  if (written && closed && std::rename(temporary.c_str(), path.c_str()) == 0) return;
-  const std::string reason = std::strerror(written ? errno : write_error);
-  std::remove(temporary.c_str());
-  throw InputError(path + ": " + reason);
+  ports::AtomicFile file = value_or_throw(ports::AtomicFile::create(path), "-o");
+  throw_if_error(file.write(bytes), "-o");
+  throw_if_error(file.commit_unsynced(), "-o");
 }
 
 void sync_file_system_of(const std::string& directory) {
@@ -237,6 +231,10 @@ void IdentityLayout::write_json(const std::string& path, const ordered_json& val
 }
 
 void IdentityLayout::begin(bool resume) {
+  std::error_code error;
+  fs::create_directories(directory_, error);
+  if (error) throw InputError(directory_ + ": " + error.message());
+  lock_.emplace(value_or_throw(ports::FolderLock::acquire(directory_), "-o"));
   const std::string about_path = directory_ + "/figurine.json";
   if (fs::exists(about_path)) {
     if (!resume)
@@ -252,7 +250,6 @@ void IdentityLayout::begin(bool resume) {
       throw InputError(about_path +
                        ": is of a capture with other settings; --resume needs the same command");
   }
-  std::error_code error;
   for (const RingCamera& entry : cameras_) {
     for (const char* kind : {"/images_lr/", "/fmask_lr/"}) {
       fs::create_directories(directory_ + kind + entry.name, error);

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "figurine/pose.h"
+#include "ports/host/folder_lock.h"
 #include "toolchain/capture/camera_rings.h"
 #include "toolchain/capture/mesh.h"
 #include "toolchain/capture/renderer.h"
@@ -35,7 +37,8 @@ class IdentityLayout {
   IdentityLayout(std::string directory, const IdentityRecord& record, const Person& person,
                  const std::vector<RingCamera>& cameras, const std::vector<CapturedPose>& sequence);
 
-  // Cameras, poses and figurine.json (complete: false), as far as not there yet.
+  // Cameras, poses and figurine.json (complete: false), as far as not there yet. From then on the
+  // folder is this object's: InputError if another process is at work in it.
   void begin(bool resume);
   bool has_image(size_t frame, size_t camera) const;
   void write_image(size_t frame, size_t camera, const Rendering& rendering) const;
@@ -49,6 +52,7 @@ class IdentityLayout {
   void write_json(const std::string& path, const nlohmann::ordered_json& value) const;
 
   std::string directory_;
+  std::optional<ports::FolderLock> lock_;
   std::array<float, 3> root_rest_m_;
   nlohmann::ordered_json about_;  // figurine.json
   const std::vector<RingCamera>& cameras_;

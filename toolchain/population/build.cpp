@@ -9,6 +9,7 @@
 
 #include "formats/writer/package_writer.h"
 #include "ports/host/files.h"
+#include "ports/host/folder_lock.h"
 #include "ports/motion/clip.h"
 #include "toolchain/body/atlas.h"
 #include "toolchain/body/makehuman_model.h"
@@ -30,6 +31,8 @@ namespace figurine::population {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kPatience_s = 20;
 
 // The recipe in the folder stays what it was: members of two recipes are no population.
 void keep_recipe(const BuildOptions& options, const State& state) {
@@ -242,6 +245,9 @@ void build(const BuildOptions& options) {
   Recipe recipe = read_recipe(options.recipe);
   const State state{options.state};
   train::make_folder(state.members());
+  // Members of a build that was killed may still be at work: they hold the folder and are ending.
+  const ports::FolderLock lock =
+      value_or_throw(ports::FolderLock::acquire(state.folder, kPatience_s), "cannot build");
   keep_recipe(options, state);
   train::write_json(state.split(), split_of(recipe));
   make_body(recipe, options, state);

@@ -1,5 +1,5 @@
-// Ctrl-C as a flag: long work looks at it between steps, saves its state and throws Interrupted. A
-// second Ctrl-C ends the process at once.
+// Ctrl-C, and a terminal that goes away, as a flag: long work looks at it between steps, saves its
+// state and throws Interrupted. A second Ctrl-C ends the process at once.
 #pragma once
 
 #include <stdexcept>
@@ -13,7 +13,8 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Takes SIGINT and SIGTERM while it lives; the old handlers come back afterwards. One at a time.
+// Takes SIGINT, SIGTERM and, unless it is ignored (nohup), SIGHUP while it lives; the old handlers
+// come back afterwards. One at a time.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdint>
@@ -12,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "ports/host/atomic_file.h"
+#include "ports/host/clock.h"
 #include "ports/host/folder_lock.h"
 
 namespace figurine::ports::files_test {
@@ -129,6 +132,73 @@ TEST_F(Files, OneLockHoldsAFolder) {
   EXPECT_NE(
       FolderLock::acquire(path("nowhere")).status().message().find("nowhere: cannot be opened"),
       std::string::npos);
+}
+
+TEST_F(Files, APipeIsRefusedAndNotWaitedFor) {
+  ASSERT_EQ(::mkfifo(path("pipe").c_str(), 0600), 0);
+  const Status mapped = MappedFile::open(path("pipe")).status();
+  EXPECT_EQ(mapped.message(), path("pipe") + ": cannot read: not a regular file");
+  EXPECT_EQ(check_regular_file(path("pipe")).message(), mapped.message());
+  EXPECT_EQ(check_regular_file(path("nowhere")).code(), StatusCode::kNotFound);
+  ASSERT_TRUE(write_file_atomically(path("a"), bytes("x")).ok());
+  EXPECT_TRUE(check_regular_file(path("a")).ok());
+}
+
+TEST_F(Files, ALinkStaysAndWhatItPointsToIsReplaced) {
+  ASSERT_EQ(::mkdir(path("far").c_str(), 0700), 0);
+  ASSERT_TRUE(write_file_atomically(path("far/target"), bytes("old")).ok());
+  for (const auto& [link, target] :
+       {std::pair("absolute", path("far/target")), std::pair("relative", std::string("far/target")),
+        std::pair("dangling", std::string("far/new"))}) {
+    ASSERT_EQ(::symlink(target.c_str(), path(link).c_str()), 0);
+    ASSERT_TRUE(write_file_atomically(path(link), bytes(link)).ok()) << link;
+    EXPECT_TRUE(std::filesystem::is_symlink(path(link))) << link;
+    EXPECT_EQ(text(MappedFile::open(path(link))->bytes()), link);
+  }
+  EXPECT_EQ(text(MappedFile::open(path("far/target"))->bytes()), "relative");
+  ASSERT_EQ(::symlink("loop", path("loop").c_str()), 0);
+  EXPECT_FALSE(write_file_atomically(path("loop"), bytes("x")).ok());
+}
+
+// The folder's first writer in a process removes what killed ones left, and nothing that lives.
+TEST_F(Files, TemporariesOfKilledProcessesAreSwept) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    Result<AtomicFile> file = AtomicFile::create(path("killed"));
+    if (file.ok()) (void)file->write(bytes("half"));
+    ::_exit(0);  // no destructor, as after SIGKILL
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_EQ(entries(), 1u);
+  std::ofstream(path(".mine.tmp")) << "not ours";
+  std::ofstream(path(".x.zzzzzzzz-1-0.figurine.tmp")) << "of another machine, young";
+  Result<AtomicFile> living = AtomicFile::create(path("living"));
+  ASSERT_TRUE(living.ok());
+  EXPECT_EQ(entries(), 3u) << "the killed one's is gone";
+  sweep_temporaries(folder_);
+  EXPECT_EQ(entries(), 3u);
+  std::filesystem::last_write_time(
+      path(".x.zzzzzzzz-1-0.figurine.tmp"),
+      std::filesystem::file_time_type::clock::now() - std::chrono::hours(25));
+  sweep_temporaries(folder_);
+  EXPECT_EQ(entries(), 2u);
+  EXPECT_TRUE(living->commit().ok());
+}
+
+TEST_F(Files, ALockMayBeWaitedFor) {
+  Result<FolderLock> lock = FolderLock::acquire(folder_);
+  ASSERT_TRUE(lock.ok());
+  const uint64_t start = now_ns();
+  EXPECT_FALSE(FolderLock::acquire(folder_, 0.1).ok());
+  EXPECT_GE(now_ns() - start, 100'000'000u);
+}
+
+TEST_F(Files, LongNamesHaveTemporariesToo) {
+  const std::string name(250, 'n');
+  EXPECT_TRUE(write_file_atomically(path(name), bytes("x")).ok());
+  EXPECT_EQ(entries(), 1u);
 }
 
 TEST_F(Files, WriteIntoMissingFolderLeavesNothing) {

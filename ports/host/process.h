@@ -1,0 +1,20 @@
+// What every program does first and last, so that a full disk, a closed terminal or a lost output
+// is an error with a line, and not silence.
+#pragma once
+
+#include "figurine/status.h"
+
+namespace figurine::ports {
+
+// Call first. program: for a message, must stay. Afterwards
+// - the descriptors 0, 1 and 2 are taken (a file that the program opens cannot become its standard
+//   output; what was closed fails when it is used);
+// - a file that grows beyond the limit of its size is an error of write() (EFBIG), not a signal;
+// - a mapped file that somebody else cuts short ends the process with one line and exit code 1.
+void prepare_process(const char* program);
+
+// Call last: whether all that was printed on the standard output has arrived where it goes. kIo if
+// not (a full disk, /dev/full, a closed descriptor).
+Status flush_standard_output();
+
+}  // namespace figurine::ports
