@@ -94,7 +94,11 @@ FlatTrainer::FlatTrainer(FlatModel& model, ProcessGroup& group, FlatTraining opt
 void FlatTrainer::resume(const nlohmann::json& log) {
   const std::string& path = options_.checkpoint;
   if (!group_.leads() || !std::filesystem::exists(path)) return;
-  const train::TensorFile file = train::read_tensor_file(path);
+  const train::TensorFile file = train::read_checkpoint_file(path);
+  if (const auto found = file.metadata.find("settings");
+      found == file.metadata.end() || found->second != options_.settings_hash) {
+    throw InputError(options_.run + "/run.json: settings: are not those of " + path);
+  }
   train::take_flat_tensor(file, path, "weights", model_.weights());
   train::take_flat_tensor(file, path, "average", average_);
   train::take_flat_tensor(file, path, "first_moment", optimiser_.first_moment);
@@ -249,6 +253,7 @@ void FlatTrainer::save(const char* status) {
   file.metadata["iteration"] = train::exact_number(static_cast<double>(progress_.iteration));
   file.metadata["seconds"] = train::exact_number(progress_.seconds);
   file.metadata["optimiser_steps"] = train::exact_number(static_cast<double>(optimiser_.steps));
+  file.metadata["settings"] = options_.settings_hash;
   train::write_tensor_file(options_.checkpoint, file);
   saved_(status, progress_);
 }

@@ -44,9 +44,10 @@ class FlatModel {
 };
 
 struct FlatTraining {
-  std::string title;       // of the progress bar
-  std::string run;         // as messages name it
-  std::string checkpoint;  // file
+  std::string title;          // of the progress bar
+  std::string run;            // as messages name it
+  std::string checkpoint;     // file
+  std::string settings_hash;  // of what the checkpoint must have been trained with
   uint32_t batch = 32;
   train::Schedule schedule;
   double beta1 = 0.9, beta2 = 0.999, weight_decay = 0;

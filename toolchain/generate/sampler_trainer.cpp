@@ -349,6 +349,7 @@ FlatTraining training_of(const SamplerRequest& request, const SamplerSettings& s
   return {.title = "sampler",
           .run = request.run,
           .checkpoint = train::RunDirectory{request.run}.checkpoint(),
+          .settings_hash = train::hash_of_settings(to_json(settings)),
           .batch = settings.batch,
           .schedule = settings.schedule,
           .beta1 = settings.beta1,

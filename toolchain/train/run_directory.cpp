@@ -12,6 +12,7 @@
 #include <sstream>
 #include <thread>
 
+#include "figurine/package.h"
 #include "ports/host/files.h"
 #include "toolchain/error.h"
 #include "toolchain/model/network_adapter.h"
@@ -252,6 +253,7 @@ void save_checkpoint(const RunDirectory& run, const TrainingState& state, const 
   }
   file.metadata["iteration"] = exact(static_cast<double>(state.iteration));
   file.metadata["seconds"] = exact(state.seconds);
+  file.metadata["settings"] = state.settings_hash;
   for (const StageField& field : kStageFields)
     file.metadata[field.name] = exact(state.stages.*field.member);
   write_tensor_file(run.checkpoint(), file);
@@ -261,10 +263,12 @@ TrainingState load_checkpoint(const RunDirectory& run, const LearnedParts& parts
                               const PartOptimisers& optimisers,
                               const std::vector<FurtherPerson>& further) {
   const std::string path = run.checkpoint();
-  const TensorFile file = read_tensor_file(path);
+  const TensorFile file = read_checkpoint_file(path);
   TrainingState state;
   state.iteration = static_cast<uint64_t>(parse_double(path, file.metadata, "iteration"));
   state.seconds = parse_double(path, file.metadata, "seconds");
+  if (const auto found = file.metadata.find("settings"); found != file.metadata.end())
+    state.settings_hash = found->second;
   for (const StageField& field : kStageFields) {
     // Checkpoints of before there were these stages say nothing of them.
     const bool may_lack =
@@ -331,6 +335,12 @@ nlohmann::json read_json(const std::string& path) {
 
 void write_json(const std::string& path, const nlohmann::json& json) {
   write_text(path, json.dump(2) + "\n");
+}
+
+std::string hash_of_settings(nlohmann::json settings) {
+  settings.erase("threads");
+  const std::string text = settings.dump();
+  return format_hash(hash_picture({reinterpret_cast<const uint8_t*>(text.data()), text.size()}));
 }
 
 void make_folder(const std::string& path) {

@@ -13,7 +13,7 @@
 //                            network
 //   evaluation.json          by figurine-train evaluate reconstruction
 //
-// Every file appears whole or not at all.
+// Every file appears whole or not at all, and .safetensors carry checksums (tensor_file.h).
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -65,6 +65,7 @@ struct TrainingState {
   uint64_t iteration = 0;  // done so far
   double seconds = 0;      // spent in the loop, all attempts together
   StageSeconds stages;
+  std::string settings_hash;  // of what it was trained with; run.json must say the same
 };
 
 struct LogRow {
@@ -115,6 +116,8 @@ std::vector<LogRow> load_log(const RunDirectory& run, uint64_t iteration);
 // Throw InputError naming the file.
 nlohmann::json read_json(const std::string& path);
 void write_json(const std::string& path, const nlohmann::json& json);
+// Of settings as run.json has them, for checkpoints; threads, which may change, left out.
+std::string hash_of_settings(nlohmann::json settings);
 void make_folder(const std::string& path);  // and those above it; there already: nothing to do
 
 // CPU model, cores, operating system: beside every figure.

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "figurine/package.h"
 #include "ports/host/files.h"
 #include "toolchain/error.h"
 
@@ -16,6 +17,12 @@ static_assert(std::endian::native == std::endian::little,
 namespace {
 
 constexpr size_t kMaxHeaderBytes = 16 << 20;
+constexpr char kChecksum[] = "checksum";
+constexpr size_t kHashDigits = 32;
+
+std::string hash_of(std::span<const std::byte> bytes) {
+  return format_hash(hash_picture({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()}));
+}
 
 [[noreturn]] void fail(const std::string& path, const std::string& reason) {
   throw InputError(path + ": " + reason);
@@ -47,6 +54,25 @@ NamedTensor read_tensor(const std::string& path, const std::string& name,
 
 }  // namespace
 
+namespace {
+
+// start: length and header. Whether it has a checksum; fails where that does not hold.
+bool check(const std::string& path, std::span<const std::byte> start,
+           std::span<const std::byte> data, const std::map<std::string, std::string>& metadata) {
+  const auto found = metadata.find(kChecksum);
+  if (found == metadata.end()) return false;
+  std::string text(reinterpret_cast<const char*>(start.data()), start.size());
+  const size_t at = text.find('"' + found->second + '"');
+  if (found->second.size() != 2 * kHashDigits || at == std::string::npos)
+    fail(path, "checksum: is none");
+  text.replace(at + 1, 2 * kHashDigits, 2 * kHashDigits, '0');
+  if (hash_of(std::as_bytes(std::span(text))) + hash_of(data) != found->second)
+    fail(path, "checksum: does not hold, the file is damaged");
+  return true;
+}
+
+}  // namespace
+
 TensorFile read_tensor_file(const std::string& path) {
   const ports::MappedFile map = value_or_throw(ports::MappedFile::open(path), path);
   const std::span<const std::byte> bytes = map.bytes();
@@ -70,12 +96,26 @@ TensorFile read_tensor_file(const std::string& path) {
   } catch (const nlohmann::json::exception&) {
     fail(path, "header is not a tensor file's JSON");
   }
+  const size_t start_bytes = sizeof(header_bytes) + header_bytes;
+  file.checked = check(path, bytes.first(start_bytes), bytes.subspan(start_bytes), file.metadata);
+  file.metadata.erase(kChecksum);
+  return file;
+}
+
+TensorFile read_checkpoint_file(const std::string& path) {
+  TensorFile file = read_tensor_file(path);
+  if (!file.checked) {
+    fail(path,
+         "checksum: missing; damaged, or written by a version before 0.2, which cannot be told "
+         "apart");
+  }
   return file;
 }
 
 void write_tensor_file(const std::string& path, const TensorFile& file) {
   nlohmann::json header = nlohmann::json::object();
-  if (!file.metadata.empty()) header["__metadata__"] = file.metadata;
+  header["__metadata__"] = file.metadata;
+  header["__metadata__"][kChecksum] = std::string(2 * kHashDigits, '0');
   uint64_t offset = 0;
   for (const auto& [name, tensor] : file.tensors) {
     const uint64_t end = offset + tensor.values.size() * sizeof(float);
@@ -94,6 +134,13 @@ void write_tensor_file(const std::string& path, const TensorFile& file) {
     if (size > 0) std::memcpy(out, tensor.values.data(), size);
     out += size;
   }
+  const size_t start_bytes = sizeof(header_bytes) + text.size();
+  const std::span<const std::byte> whole(bytes);
+  const std::string checksum =
+      hash_of(whole.first(start_bytes)) + hash_of(whole.subspan(start_bytes));
+  // By its key: another value may be made of zeros, too.
+  const size_t at = text.find('"' + std::string(kChecksum) + "\":\"") + sizeof(kChecksum) + 3;
+  std::memcpy(bytes.data() + sizeof(header_bytes) + at, checksum.data(), checksum.size());
   throw_if_error(ports::write_file_atomically(path, bytes), "cannot save");
 }
 

@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 
+#include "ports/host/folder_lock.h"
 #include "toolchain/dataset/dataset.h"
 #include "toolchain/error.h"
 #include "toolchain/model/allocator.h"
@@ -212,6 +214,8 @@ class Trainer {
   void start() {
     if (request_.resume && std::filesystem::exists(run_.checkpoint())) {
       state_ = load_checkpoint(run_, parts(), optimisers(), further());
+      if (state_.settings_hash != hash_of_settings(to_json(settings_)))
+        throw InputError(run_.run_json() + ": settings: are not those of checkpoint.safetensors");
       rows_ = load_log(run_, state_.iteration);
       measure_smallest_extents(1);  // the checkpoint has the first person's
     } else {
@@ -252,6 +256,7 @@ class Trainer {
       }
     }
     write_json(run_.run_json(), description_);
+    state_.settings_hash = hash_of_settings(to_json(settings_));
   }
 
   IterationResult iterate(double rate) {
@@ -616,6 +621,11 @@ TrainResult train_avatar(const TrainRequest& request) {
   const RunDirectory run{request.run};
   TrainSettings settings = request.settings;
   nlohmann::json description;
+  std::optional<ports::FolderLock> lock;  // of two trainings in one folder the slower one would win
+  const auto lock_run = [&] {
+    lock.emplace(value_or_throw(ports::FolderLock::acquire(request.run), "cannot train"));
+  };
+  if (std::filesystem::is_directory(request.run)) lock_run();
   const bool exists = std::filesystem::exists(run.run_json());
   if (exists && !request.resume)
     throw InputError(request.run + ": holds a run already; --resume goes on with it");
@@ -654,6 +664,7 @@ TrainResult train_avatar(const TrainRequest& request) {
     description.update(request.notes);
     if (paths.size() > 1) description["people"] = list_people(paths);
     make_folder(request.run);
+    if (!lock) lock_run();
   }
   model::use_threads(threads_a_lane(settings));
   model::keep_freed_memory();

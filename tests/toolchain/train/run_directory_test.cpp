@@ -70,6 +70,46 @@ TEST_F(RunDirectoryTest, TensorFileRefusesEveryPrefix) {
   }
 }
 
+// Ten of thirteen damaged checkpoints were resumed without a word: values that stay finite, digits
+// that stay digits.
+TEST_F(RunDirectoryTest, TensorFileRefusesEveryChangedByte) {
+  write_tensor_file(path("x.safetensors"), example());
+  std::ifstream file(path("x.safetensors"), std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  for (size_t at = 0; at < bytes.size(); ++at) {
+    for (const int change : {1, 0x10, 0x80}) {
+      std::string damaged = bytes;
+      damaged[at] = static_cast<char>(damaged[at] ^ change);
+      std::ofstream(path("damaged"), std::ios::binary) << damaged;
+      try {
+        read_checkpoint_file(path("damaged"));
+        FAIL() << "byte " << at << " ^ " << change;
+      } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("damaged: "), std::string::npos) << error.what();
+      }
+    }
+  }
+  std::ofstream(path("longer"), std::ios::binary) << bytes << '\0';
+  EXPECT_NE(read_error(path("longer")).find("checksum"), std::string::npos);
+}
+
+TEST_F(RunDirectoryTest, OnlyACheckpointNeedsAChecksum) {
+  const std::string header = R"({"w": {"dtype": "F32", "shape": [1], "data_offsets": [0, 4]}})";
+  const uint64_t length = header.size();
+  std::ofstream file(path("theirs"), std::ios::binary);
+  file.write(reinterpret_cast<const char*>(&length), 8);
+  file << header << std::string(4, '\0');
+  file.close();
+  EXPECT_EQ(read_error(path("theirs")), "");
+  EXPECT_FALSE(read_tensor_file(path("theirs")).checked);
+  try {
+    read_checkpoint_file(path("theirs"));
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("checksum: missing"), std::string::npos);
+  }
+}
+
 TEST_F(RunDirectoryTest, TensorFileNamesWhatIsWrong) {
   EXPECT_NE(read_error(path("absent")).find("absent"), std::string::npos);
   const auto write = [&](const std::string& header, size_t data_bytes, float value = 0) {
