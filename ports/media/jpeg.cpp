@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 // jpeglib.h needs stdio.h before it.
 #include <jpeglib.h>
@@ -34,10 +35,61 @@ void keep_warning(j_common_ptr info, int level) {
   if (error->manager.num_warnings++ == 0) error->manager.format_message(info, error->message);
 }
 
+// EXIF's orientation, 1 to 8, of the first APP1 segment that says one; 1 if none does. An EXIF
+// segment is "Exif\0\0" and a TIFF header, whose first directory has the tag.
+int orientation_of(jpeg_saved_marker_ptr marker) {
+  for (; marker != nullptr; marker = marker->next) {
+    const JOCTET* d = marker->data;
+    const size_t size = marker->data_length;
+    if (marker->marker != JPEG_APP0 + 1 || size < 14 || std::memcmp(d, "Exif\0\0", 6) != 0)
+      continue;
+    const bool big = d[6] == 'M';
+    const auto number = [&](size_t at, int bytes) -> size_t {  // the caller knows it is inside
+      size_t value = 0;
+      for (int i = 0; i < bytes; ++i)
+        value |= static_cast<size_t>(d[at + static_cast<size_t>(big ? bytes - 1 - i : i)])
+                 << (8 * i);
+      return value;
+    };
+    const size_t directory = 6 + number(10, 4);
+    if (directory + 2 > size) continue;
+    const size_t entries = number(directory, 2);
+    for (size_t e = 0; e < entries; ++e) {
+      const size_t entry = directory + 2 + 12 * e;
+      if (entry + 12 > size) break;
+      if (number(entry, 2) != 0x0112) continue;
+      const size_t value = number(entry + 8, 2);
+      return value >= 1 && value <= 8 ? static_cast<int>(value) : 1;
+    }
+  }
+  return 1;
+}
+
+// Upright, of an image that is stored as EXIF's orientation says.
+ImageU8 turned(ImageU8 image, int orientation) {
+  if (orientation == 1) return image;
+  const bool swapped = orientation >= 5;
+  ImageU8 out(swapped ? image.height_px : image.width_px,
+              swapped ? image.width_px : image.height_px, image.channels);
+  // Whether the stored columns (rows) run against the upright image's.
+  const bool flip_x = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+  const bool flip_y = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+  for (uint32_t y = 0; y < out.height_px; ++y) {
+    for (uint32_t x = 0; x < out.width_px; ++x) {
+      const uint32_t along_x = swapped ? y : x, along_y = swapped ? x : y;
+      const uint32_t from_x = flip_x ? image.width_px - 1 - along_x : along_x,
+                     from_y = flip_y ? image.height_px - 1 - along_y : along_y;
+      std::memcpy(out.at(x, y), image.at(from_x, from_y), image.channels);
+    }
+  }
+  return out;
+}
+
 // Reads the header, then calls prepare(header) for a buffer of width * height * 3 bytes; a null
 // buffer stops there.
-bool run_decoder(std::span<const std::byte> bytes, JpegSize* header,
-                 uint8_t* (*prepare)(void*, const JpegSize&), void* context, JpegError* error) {
+bool run_decoder(std::span<const std::byte> bytes, JpegSize* header, int* orientation,
+                 bool* readable, uint8_t* (*prepare)(void*, const JpegSize&), void* context,
+                 JpegError* error) {
   jpeg_decompress_struct info;
   std::memset(&info, 0, sizeof info);
   info.err = jpeg_std_error(&error->manager);
@@ -51,9 +103,17 @@ bool run_decoder(std::span<const std::byte> bytes, JpegSize* header,
   jpeg_create_decompress(&info);
   jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()),
                static_cast<unsigned long>(bytes.size()));
+  jpeg_save_markers(&info, JPEG_APP0 + 1, 0xffff);
   jpeg_read_header(&info, TRUE);
   header->width_px = info.image_width;
   header->height_px = info.image_height;
+  *orientation = orientation_of(info.marker_list);
+  if (info.jpeg_color_space == JCS_CMYK || info.jpeg_color_space == JCS_YCCK) {
+    std::strcpy(error->message, "has CMYK colours, which are not read; save it as RGB");
+    *readable = false;
+    jpeg_destroy_decompress(&info);
+    return true;
+  }
   uint8_t* buffer = prepare(context, *header);
   if (buffer != nullptr) {
     info.out_color_space = JCS_RGB;
@@ -90,13 +150,20 @@ Result<ImageU8> decode(std::span<const std::byte> bytes, bool header_only,
     t->image.pixels.resize(size_t{h.width_px} * h.height_px * 3);
     return t->image.pixels.data();
   };
-  if (!run_decoder(bytes, &header, prepare, &target, &error))
+  int orientation = 1;
+  bool readable = true;
+  if (!run_decoder(bytes, &header, &orientation, &readable, prepare, &target, &error))
     return Status(StatusCode::kCorrupt, name + ": damaged JPEG: " + error.message);
   if (target.too_large) {
     return Status(StatusCode::kLimitExceeded,
                   name + ": image larger than " + std::to_string(kMaxSide) + " pixels a side");
   }
-  return std::move(target.image);
+  if (!readable) return Status(StatusCode::kUnsupported, name + ": " + error.message);
+  if (header_only) {
+    if (orientation >= 5) std::swap(target.image.width_px, target.image.height_px);
+    return std::move(target.image);
+  }
+  return turned(std::move(target.image), orientation);
 }
 
 // The bytes in *buffer, from malloc.

@@ -18,12 +18,12 @@ struct JpegSize {
   uint32_t height_px = 0;
 };
 
-// Three channels, whatever the file has. name appears in messages. kCorrupt for what is no JPEG, or
-// one that libjpeg can only decode with warnings (cut off, corrupt segments); kLimitExceeded beyond
-// 16384 pixels a side.
+// Three channels, whatever the file has, upright as its EXIF says. name appears in messages.
+// kCorrupt for what is no JPEG, or one that libjpeg can only decode with warnings (cut off, corrupt
+// segments); kLimitExceeded beyond 16384 pixels a side; kUnsupported for CMYK.
 Result<ImageU8> decode_jpeg(std::span<const std::byte> bytes, const std::string& name);
 
-// Width and height from the header alone.
+// Width and height from the header alone; upright, too.
 Result<JpegSize> decode_jpeg_size(std::span<const std::byte> bytes, const std::string& name);
 
 // RGB; chroma at full resolution (4:4:4), optimised Huffman tables. quality 1 to 100. The same

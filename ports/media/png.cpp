@@ -50,6 +50,9 @@ Result<ImageU8> decode_png(std::span<const std::byte> bytes, const std::string& 
   if (!png_image_begin_read_from_memory(&png.image, bytes.data(), bytes.size())) {
     return Status(StatusCode::kCorrupt, name + ": png: " + png.image.message);
   }
+  // 16 bits a channel are taken for linear light unless they say otherwise, and would be
+  // brightened: cameras and masks mean what they store.
+  png.image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;
   uint32_t channels = 1;
   if (png.image.format & PNG_FORMAT_FLAG_ALPHA) {
     channels = 4;
@@ -73,6 +76,13 @@ Result<ImageU8> decode_png(std::span<const std::byte> bytes, const std::string& 
   // Warnings (a bad checksum of an optional chunk) are not errors; a short image is one that libpng
   // reports above.
   return image;
+}
+
+Result<PngSize> decode_png_size(std::span<const std::byte> bytes, const std::string& name) {
+  PngImage png;
+  if (!png_image_begin_read_from_memory(&png.image, bytes.data(), bytes.size()))
+    return Status(StatusCode::kCorrupt, name + ": png: " + png.image.message);
+  return PngSize{png.image.width, png.image.height};
 }
 
 }  // namespace figurine::ports

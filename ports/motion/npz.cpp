@@ -249,43 +249,66 @@ bool NpzFile::has(const std::string& name) const {
   return zip_name_locate(archive_->zip, (name + ".npy").c_str(), 0) >= 0;
 }
 
-Result<NpyArray> NpzFile::read(const std::string& name, const std::vector<size_t>* shape) const {
-  const std::string where = archive_->where + ": " + name;
+struct NpzFile::Opened {
+  std::string where;
+  uint64_t size = 0;  // of the whole .npy
+  std::unique_ptr<zip_file_t, int (*)(zip_file_t*)> file{nullptr, zip_fclose};
+  std::vector<std::byte> bytes;  // read so far
+  Header header;
+};
+
+Result<NpzFile::Opened> NpzFile::open_array(const std::string& name) const {
+  Opened array;
+  array.where = archive_->where + ": " + name;
   const zip_int64_t index = zip_name_locate(archive_->zip, (name + ".npy").c_str(), 0);
-  if (index < 0) return Status(StatusCode::kNotFound, where + ": no such array");
+  if (index < 0) return Status(StatusCode::kNotFound, array.where + ": no such array");
   zip_stat_t stat;
   if (zip_stat_index(archive_->zip, static_cast<zip_uint64_t>(index), 0, &stat) != 0 ||
       (stat.valid & ZIP_STAT_SIZE) == 0) {
-    return corrupt(where + ": its size is not known");
+    return corrupt(array.where + ": its size is not known");
   }
-  const std::unique_ptr<zip_file_t, int (*)(zip_file_t*)> file(
-      zip_fopen_index(archive_->zip, static_cast<zip_uint64_t>(index), 0), zip_fclose);
-  if (file == nullptr) return corrupt(where + ": " + zip_strerror(archive_->zip));
-  // The header first, and what it declares.
-  std::vector<std::byte> bytes(std::min<uint64_t>(stat.size, 12 + kMaxHeaderBytes));
-  zip_int64_t got = zip_fread(file.get(), bytes.data(), bytes.size());
-  if (got != static_cast<zip_int64_t>(bytes.size()))
-    return corrupt(where + ": damaged: wrong length or checksum");
-  const Result<Header> header = parse_header(bytes, stat.size, where);
+  array.size = stat.size;
+  array.file.reset(zip_fopen_index(archive_->zip, static_cast<zip_uint64_t>(index), 0));
+  if (array.file == nullptr) return corrupt(array.where + ": " + zip_strerror(archive_->zip));
+  array.bytes.resize(std::min<uint64_t>(stat.size, 12 + kMaxHeaderBytes));
+  const zip_int64_t got = zip_fread(array.file.get(), array.bytes.data(), array.bytes.size());
+  if (got != static_cast<zip_int64_t>(array.bytes.size()))
+    return corrupt(array.where + ": damaged: wrong length or checksum");
+  Result<Header> header = parse_header(array.bytes, stat.size, array.where);
   if (!header.ok()) return header.status();
+  array.header = std::move(header).value();
+  return array;
+}
+
+Result<std::vector<size_t>> NpzFile::declared_shape(const std::string& name) const {
+  const Result<Opened> array = open_array(name);
+  if (!array.ok()) return array.status();
+  return array->header.shape;
+}
+
+Result<NpyArray> NpzFile::read(const std::string& name, const std::vector<size_t>* shape) const {
+  Result<Opened> opened = open_array(name);
+  if (!opened.ok()) return opened.status();
+  Opened& array = *opened;
   if (shape != nullptr) {
-    bool equal = header->shape.size() == shape->size();
+    bool equal = array.header.shape.size() == shape->size();
     for (size_t i = 0; equal && i < shape->size(); ++i)
-      equal = (*shape)[i] == 0 || (*shape)[i] == header->shape[i];
+      equal = (*shape)[i] == 0 || (*shape)[i] == array.header.shape[i];
     if (!equal) {
-      return corrupt(where + ": shape " + shape_text(header->shape) + ", expected " +
+      return corrupt(array.where + ": shape " + shape_text(array.header.shape) + ", expected " +
                      shape_text(*shape));
     }
   }
-  const size_t first = bytes.size();
-  bytes.resize(stat.size);
-  got = zip_fread(file.get(), bytes.data() + first, bytes.size() - first);
+  const size_t first = array.bytes.size();
+  array.bytes.resize(array.size);
+  const zip_int64_t got =
+      zip_fread(array.file.get(), array.bytes.data() + first, array.bytes.size() - first);
   std::byte beyond;
-  if (got != static_cast<zip_int64_t>(bytes.size() - first) ||
-      zip_fread(file.get(), &beyond, 1) != 0) {  // reading on checks the CRC
-    return corrupt(where + ": damaged: wrong length or checksum");
+  if (got != static_cast<zip_int64_t>(array.bytes.size() - first) ||
+      zip_fread(array.file.get(), &beyond, 1) != 0) {  // reading on checks the CRC
+    return corrupt(array.where + ": damaged: wrong length or checksum");
   }
-  return values_of(bytes, *header);
+  return values_of(array.bytes, array.header);
 }
 
 Result<NpyArray> NpzFile::read(const std::string& name) const { return read(name, nullptr); }

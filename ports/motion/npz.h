@@ -39,6 +39,8 @@ class NpzFile {
   ~NpzFile();
 
   bool has(const std::string& name) const;  // without ".npy"
+  // What the array declares, found without unpacking it. Errors as of read().
+  Result<std::vector<size_t>> declared_shape(const std::string& name) const;
   // shape: expected extents; 0 accepts any. Errors name file, array and reason; kNotFound if there
   // is no such array.
   Result<NpyArray> read(const std::string& name, const std::vector<size_t>& shape) const;
@@ -46,7 +48,9 @@ class NpzFile {
 
  private:
   struct Archive;
+  struct Opened;  // an array up to its header
   explicit NpzFile(std::unique_ptr<Archive> archive);
+  Result<Opened> open_array(const std::string& name) const;
   Result<NpyArray> read(const std::string& name, const std::vector<size_t>* shape) const;
   std::unique_ptr<Archive> archive_;
 };

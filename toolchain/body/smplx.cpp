@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
+#include "ports/host/files.h"
 #include "ports/motion/npz.h"
 #include "toolchain/body/skin.h"
 #include "toolchain/error.h"
@@ -12,6 +14,8 @@ namespace {
 
 constexpr uint32_t kMaxCoefficients = 20;
 constexpr size_t kMaxVertices = 1 << 20;
+constexpr size_t kMaxDirections = 1024;                          // SMPL-X has 400
+constexpr double kLeastSurface_m2 = 0.05, kMostSurface_m2 = 50;  // an adult has 1.9
 constexpr double kMaxCoordinate = 100;  // metres: a file in millimetres is not silently believed
 
 void check_range(const ports::NpyArray& array, double low, double high, const std::string& where) {
@@ -58,10 +62,66 @@ JointPositions regress(const ports::NpyArray& regressor, const std::vector<doubl
   return joints;
 }
 
+// Before an array is unpacked: a file of a few hundred kB may declare gigabytes.
+void check_declared(const ports::NpzFile& file, const std::string& path) {
+  const auto most = [&](const char* name, size_t dimension, size_t limit) {
+    const std::vector<size_t> shape = value_or_throw(file.declared_shape(name));
+    if (shape.size() > dimension && shape[dimension] > limit) {
+      throw InputError(path + ": " + name + ": declares " + std::to_string(shape[dimension]) +
+                       ", more than " + std::to_string(limit));
+    }
+  };
+  most("v_template", 0, kMaxVertices);
+  most("f", 0, 2 * kMaxVertices);
+  most("ft", 0, 2 * kMaxVertices);
+  most("vt", 0, 2 * kMaxVertices);
+  most("shapedirs", 2, kMaxDirections);
+}
+
+// A vertex that hangs on no joint would hang on the root.
+void check_weights(const ports::NpyArray& weights, size_t vertices, const std::string& where) {
+  for (size_t v = 0; v < vertices; ++v) {
+    double sum = 0;
+    for (uint32_t j = 0; j < kJointCount; ++j) sum += weights.values[v * kJointCount + j];
+    if (!(std::abs(sum - 1) < 0.01)) {
+      throw InputError(where + ": those of vertex " + std::to_string(v) + " sum to " +
+                       std::to_string(sum) + ", not 1");
+    }
+  }
+}
+
+// Faces without area carry no texels: some are an artist's, more than a tenth are no body.
+void check_faces(const ports::NpyArray& positions, const ports::NpyArray& faces, const std::string& where) {
+  const size_t count = faces.shape[0];
+  size_t flat = 0;
+  double area_m2 = 0;
+  for (size_t f = 0; f < count; ++f) {
+    const auto corner = [&](size_t k, size_t i) {
+      return positions.values[3 * static_cast<size_t>(faces.values[3 * f + k]) + i];
+    };
+    double a[3], b[3];
+    for (size_t i = 0; i < 3; ++i)
+      a[i] = corner(1, i) - corner(0, i), b[i] = corner(2, i) - corner(0, i);
+    const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2],
+                 z = a[0] * b[1] - a[1] * b[0];
+    const double area = 0.5 * std::sqrt(x * x + y * y + z * z);
+    area_m2 += area;
+    flat += area < 1e-12;
+  }
+  if (count == 0 || flat * 10 > count) {
+    throw InputError(where + ": " + std::to_string(flat) + " of " + std::to_string(count) +
+                     " faces have no area");
+  }
+  if (!(area_m2 > kLeastSurface_m2 && area_m2 < kMostSurface_m2))
+    throw InputError(where + ": a surface of " + std::to_string(area_m2) + " m2 is no person's");
+}
+
 }  // namespace
 
 BodyModel read_smplx(const std::string& path) {
+  throw_if_error(ports::check_regular_file(path), "--smplx");
   const ports::NpzFile file = value_or_throw(ports::NpzFile::open(path));
+  check_declared(file, path);
   const auto where = [&](const char* name) { return path + ": " + name; };
   ports::NpyArray positions = value_or_throw(file.read("v_template", {0, 3}));
   const size_t vertices = positions.shape[0];
@@ -82,6 +142,8 @@ BodyModel read_smplx(const std::string& path) {
   check_range(directions, -kMaxCoordinate, kMaxCoordinate, where("shapedirs"));
   check_range(regressor, -1e3, 1e3, where("J_regressor"));
   check_range(weights, 0, 1, where("weights"));
+  check_weights(weights, vertices, where("weights"));
+  check_faces(positions, faces, where("f"));
   for (uint32_t j = 0; j < kJointCount; ++j) {
     double sum = 0;
     for (size_t v = 0; v < vertices; ++v) sum += regressor.values[j * vertices + v];
@@ -95,6 +157,10 @@ BodyModel read_smplx(const std::string& path) {
   double lowest = kMaxCoordinate;
   for (size_t v = 0; v < vertices; ++v) lowest = std::min(lowest, positions.values[3 * v + 1]);
   for (size_t v = 0; v < vertices; ++v) positions.values[3 * v + 1] -= lowest;
+  // Rh and Th of fits turn about the origin of the file.
+  char origin[64];
+  std::snprintf(origin, sizeof origin, "0 %.9g 0", -lowest);
+  model.provenance.settings.push_back({"model_origin_m", origin});
   Surface& surface = model.surface;
   surface.position_m.assign(positions.values.begin(), positions.values.end());
   surface.triangles = indices(faces);

@@ -303,7 +303,9 @@ ports::ImageU8 contact_sheet(const std::string& identity_directory, uint32_t col
                cells = size_t{columns} * rows;
   Sheet sheet(columns, rows, data.cameras()[0].camera);
   for (size_t i = 0; i < cells; ++i) {
-    sheet.put(i, data.load_image(i * frames / cells, (i * 7 + i / columns) % cameras));
+    const size_t frame = i * frames / cells;
+    sheet.put(
+        i, data.load_image(frame, data.camera_with_image(frame, (i * 7 + i / columns) % cameras)));
   }
   return sheet.take();
 }
@@ -319,7 +321,7 @@ ports::ImageU8 people_sheet(const std::vector<std::string>& identity_directories
                     static_cast<uint32_t>((identity_directories.size() + columns - 1) / columns),
                     size);
     const size_t frame = i % data.frames().size();
-    sheet->put(i, data.load_image(frame, front_camera(data, frame)));
+    sheet->put(i, data.load_image(frame, data.camera_with_image(frame, front_camera(data, frame))));
   }
   return sheet->take();
 }

@@ -11,6 +11,7 @@ namespace figurine::cli {
 void add_body_command(CLI::App& app);
 void add_motion_command(CLI::App& app);
 void add_capture_command(CLI::App& app);
+void add_check_capture_command(CLI::App& app);
 void add_avatar_command(CLI::App& app);
 void add_basis_command(CLI::App& app);
 void add_pack_command(CLI::App& app);

@@ -1,21 +1,25 @@
-// Reads one identity of a multi-view capture in MVHumanNet's layout, real or of figurine-train
-// capture (docs/capture.md), as cameras, poses and images.
+// One identity of a multi-view capture as cameras, poses and images, in one of two layouts
+// (docs/capture.md, docs/own_person.md):
 //
-//   ID/images_lr/CAM/0005_img.jpg        colour, at half the size that camera_intrinsics.json
-//       speaks of
-//   ID/fmask_lr/CAM/0005_img_fmask.png   foreground mask; soft alpha in our captures
+// MVHumanNet's, real or of figurine-train capture (camera_intrinsics.json is there)
+//   ID/images_lr/CAM/0005_img.jpg        colour, .jpg or .png; or images/
+//   ID/fmask_lr/CAM/0005_img_fmask.png   foreground mask; soft alpha in our captures; or fmask/
 //   ID/camera_extrinsics.json, ID/camera_intrinsics.json, ID/camera_scale.pkl
 //   ID/smplx/smpl/000000.json            pose of frame 5: index = frame / 5 - 1
 //   ID/figurine.json                     ours only: seed, body, shape, splits, framing, and full
 //       poses (87 numbers cannot hold two hands)
 //
-// What a user of that data set stumbles over is handled here, once: intrinsics are halved,
-// translations are multiplied by the camera scale (a pickled float, parsed without unpickling),
-// Rh/Th rotate about the origin and not the pelvis, camera 41 is wrong, frames without a pose are
-// left out and counted. Nothing is cached: images are decoded when asked for.
+// EasyMocap's (intri.yml is there)
+//   ID/images/CAM/000000.jpg, ID/mask/CAM/000000.png, ID/intri.yml, ID/extri.yml
+//   ID/output/smplx/000000.json          pose of frame 0; docs/own_person.md lists the folders
+//
+// What a user of such data stumbles over is handled here, once: units and sizes of intrinsics,
+// lenses that bend (lens.h), Rh/Th about the origin and not the pelvis, bystanders, pictures of all
+// kinds (picture_reader.h). What is left out is counted, and said in `remarks`. Nothing is cached:
+// images are decoded when asked for.
 //
 // Based on: Xiong et al., MVHumanNet: A Large-scale Dataset of Multi-view Daily Dressing Human
-// Captures, 2024.
+// Captures, 2024; EasyMocap's documentation.
 #pragma once
 
 #include <array>
@@ -26,6 +30,12 @@
 #include "figurine/body.h"
 #include "figurine/camera.h"
 #include "figurine/pose.h"
+#include "toolchain/dataset/lens.h"
+#include "toolchain/dataset/smplx_person.h"
+
+namespace figurine {
+class Package;
+}
 
 namespace figurine::dataset {
 
@@ -40,6 +50,7 @@ enum class Role : uint8_t {
   kHeldOutPoseInterleaved,  // training camera, a pose between training poses
   kHeldOutPoseBlock,        // training camera, a pose of a run that is far from all training poses
   kHeldOutViewAndPose,      // both held out
+  kMissing,                 // there is no image, or its camera shows nobody: for nothing
 };
 const char* to_string(Role role);
 
@@ -60,10 +71,11 @@ struct Split {
 Split default_split(uint32_t frame_count, uint32_t camera_count);
 
 struct CaptureCamera {
-  std::string name;  // folder below images_lr
-  Camera camera;     // at the size of the stored images
+  std::string name;  // folder below images_lr or images
+  Camera camera;     // at the size of the stored images, without the lens's distortion
   bool held_out = false;
   Framing framing = Framing::kBody;  // where nothing is said, as in MVHumanNet, kBody
+  Lens lens;                         // what load_image straightens
 };
 
 struct CaptureFrame {
@@ -92,63 +104,91 @@ struct DatasetOptions {
   // Content hash of the body package (format_hash). If given, and the capture names its body, both
   // must be equal, or `body` have the skeleton that the capture names (skeleton_hash.h).
   std::string body_hash;
+  // Of that body: where the origin of the model lies that Rh/Th turn about (model_origin).
+  ModelOrigin origin;
+};
+
+// The key among a body package's settings, written by the importer of SMPL-X: "x y z", metres.
+inline constexpr char kModelOriginSetting[] = "model_origin_m";
+
+// Of a body package: its provenance says it where the body came from SMPL-X. Throws InputError for
+// one of an older version, which does not.
+ModelOrigin model_origin(const Package& body, const std::string& path);
+
+// What the readers of the layouts fill in, and Dataset serves.
+struct DatasetParts {
+  std::string directory;
+  std::vector<CaptureCamera> cameras;
+  std::vector<std::vector<std::string>> images, masks;  // [V][F] paths; empty where there is none
+  std::vector<CaptureFrame> frames;
+  std::vector<float> shape;
+  std::vector<std::string> sources, remarks;
+  uint32_t frames_without_pose = 0, cameras_left_out = 0, images_left_out = 0;
+  uint64_t seed = 0;
+  std::string body_name, body_hash;
+  bool composited_on_black = false;
 };
 
 class Dataset {
  public:
   // Reads and checks everything but the images: sizes, finite values, rotations, that every
-  // camera's folder has the same image size and every frame its files. Throws InputError: "FILE:
+  // camera's folder has the same image size, that cameras see the person. Throws InputError: "FILE:
   // FIELD: reason".
   static Dataset open(const std::string& directory, const DatasetOptions& options = {});
 
-  const std::string& directory() const { return directory_; }
-  const std::vector<CaptureCamera>& cameras() const { return cameras_; }
-  const std::vector<CaptureFrame>& frames() const { return frames_; }
+  const std::string& directory() const { return parts_.directory; }
+  const std::vector<CaptureCamera>& cameras() const { return parts_.cameras; }
+  const std::vector<CaptureFrame>& frames() const { return parts_.frames; }
   const std::vector<float>& shape() const {
-    return shape_;
+    return parts_.shape;
   }  // [20] of our captures, [10] of MVHumanNet's
   Role role(size_t frame, size_t camera) const;
 
-  // Frames that have images but no usable pose file, and cameras that are known to be wrong: left
-  // out of the lists above.
-  uint32_t frames_without_pose() const { return frames_without_pose_; }
-  uint32_t cameras_left_out() const { return cameras_left_out_; }
+  bool has_image(size_t frame, size_t camera) const { return !image_path(frame, camera).empty(); }
 
-  uint64_t seed() const { return seed_; }  // 0 where there is no figurine.json
+  // Left out of the lists above: frames that have images but no usable pose file, cameras that are
+  // known to be wrong or show nobody. And single images that are not there, or have no mask.
+  uint32_t frames_without_pose() const { return parts_.frames_without_pose; }
+  uint32_t cameras_left_out() const { return parts_.cameras_left_out; }
+  uint32_t images_left_out() const { return parts_.images_left_out; }
+  // All of that, and what was taken for granted, a line each: for people.
+  const std::vector<std::string>& remarks() const { return parts_.remarks; }
+
+  uint64_t seed() const { return parts_.seed; }  // 0 where there is no figurine.json
   const std::string& body_name() const {
-    return body_name_;
+    return parts_.body_name;
   }  // empty where there is no figurine.json
   const std::string& body_hash() const {
-    return body_hash_;
+    return parts_.body_hash;
   }  // empty where there is no figurine.json
   const std::vector<std::string>& sources() const {
-    return sources_;
+    return parts_.sources;
   }  // data it was made from, with licences; empty where there is no figurine.json
+
+  // Decodes masks until every camera has shown somebody: one of which all masks are blank shows
+  // nothing from then on (Role::kMissing, and a remark). Throws InputError if none is left. Before
+  // long work; nothing else decodes masks before they are asked for.
+  void leave_out_blank_cameras();
 
   // Decodes image and mask. May be called from several threads. Throws InputError on a missing or
   // damaged file or one of another size.
+  // Throws InputError, too, where there is none.
   CaptureImage load_image(size_t frame, size_t camera) const;
-  std::string image_path(size_t frame, size_t camera) const;
-  std::string mask_path(size_t frame, size_t camera) const;
+  // The first of a frame's images from `camera` on that is there; all cameras round.
+  size_t camera_with_image(size_t frame, size_t camera) const;
+  // Empty where there is none.
+  const std::string& image_path(size_t frame, size_t camera) const {
+    return parts_.images.at(camera).at(frame);
+  }
+  const std::string& mask_path(size_t frame, size_t camera) const {
+    return parts_.masks.at(camera).at(frame);
+  }
 
  private:
-  class Reading;  // what open() does, step by step
-
   Dataset() = default;
+  std::vector<uint8_t> load_mask(size_t frame, size_t camera) const;
 
-  std::string directory_;
-  std::vector<CaptureCamera> cameras_;
-  std::vector<std::vector<std::string>> image_files_,
-      mask_files_;  // [V][F] names below the camera's folder
-  std::vector<CaptureFrame> frames_;
-  std::vector<float> shape_;
-  std::vector<std::string> sources_;
-  uint32_t frames_without_pose_ = 0;
-  uint32_t cameras_left_out_ = 0;
-  uint64_t seed_ = 0;
-  std::string body_name_;
-  std::string body_hash_;
-  bool composited_on_black_ = false;
+  DatasetParts parts_;
 };
 
 }  // namespace figurine::dataset

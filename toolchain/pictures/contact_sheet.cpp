@@ -75,7 +75,8 @@ std::vector<std::pair<size_t, size_t>> choose_pictures(const train::TrainedAvata
       if (data.cameras()[camera].framing != dataset::Framing::kBody) continue;
       const dataset::Role role = data.role(frame, camera);
       if (role == dataset::Role::kHeldOutViewAndPose) both.emplace_back(frame, camera);
-      if (role != dataset::Role::kTrain) any.emplace_back(frame, camera);
+      if (role != dataset::Role::kTrain && role != dataset::Role::kMissing)
+        any.emplace_back(frame, camera);
     }
   }
   const auto& from = both.empty() ? any : both;
@@ -135,7 +136,7 @@ std::optional<size_t> bust_camera(const train::TrainedAvatar& avatar, size_t fra
   float most = -2;
   for (size_t camera = 0; camera < data.cameras().size(); ++camera) {
     if (data.cameras()[camera].framing != dataset::Framing::kBust ||
-        data.role(frame, camera) == dataset::Role::kTrain)
+        data.role(frame, camera) == dataset::Role::kTrain || !data.has_image(frame, camera))
       continue;
     const float sees =
         train::facing(avatar.body(), data.frames()[frame], data.cameras()[camera].camera);

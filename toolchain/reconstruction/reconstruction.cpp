@@ -142,7 +142,7 @@ nlohmann::json evaluate_reconstruction(train::TrainedAvatar& avatar,
     std::optional<PosedFrame> posed;
     for (size_t camera = 0; camera < cameras; ++camera) {
       const dataset::Role role = data.role(frame, camera);
-      if (role == dataset::Role::kTrain) continue;
+      if (role == dataset::Role::kTrain || role == dataset::Role::kMissing) continue;
       if (interrupt.requested()) throw train::Interrupted("evaluate: stopped; nothing was written");
       if (!posed) {
         posed = pose_frame(avatar, frame);

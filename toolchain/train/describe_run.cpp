@@ -36,6 +36,7 @@ nlohmann::json describe_run(const RunSources& sources, const TrainSettings& sett
            {{"path", data.directory()},
             {"seed", data.seed()},
             {"sources", data.sources()},
+            {"remarks", data.remarks()},
             {"cameras", data.cameras().size() - held_out_cameras},
             {"held_out_cameras", held_out_cameras},
             {"training_frames", frames[0]},

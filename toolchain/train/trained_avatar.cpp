@@ -31,7 +31,10 @@ TrainedAvatar TrainedAvatar::open(const OpenRunOptions& options) {
                      " was trained on " + description.body_hash);
   }
   avatar.data_ = std::make_unique<dataset::Dataset>(dataset::Dataset::open(
-      description.data, {.body = &avatar.body_->package.body(), .body_hash = hash}));
+      description.data,
+      {.body = &avatar.body_->package.body(),
+       .body_hash = hash,
+       .origin = dataset::model_origin(avatar.body_->package, description.body)}));
   if (avatar.data_->shape() != description.shape)
     throw InputError(description.data + ": shape: is not the person of " + options.run);
   TrainSettings settings = description.settings;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 
@@ -647,9 +648,14 @@ TrainResult train_avatar(const TrainRequest& request) {
   if (settings.perceptual.file.empty() != (request.perceptual == nullptr))
     throw InputError(request.run + ": perceptual: its network and its settings go together");
   std::vector<std::unique_ptr<dataset::Dataset>> data;
+  const dataset::ModelOrigin origin = dataset::model_origin(body.package, request.body);
   for (const std::string& path : paths) {
-    data.push_back(std::make_unique<dataset::Dataset>(
-        dataset::Dataset::open(path, {.body = &body.package.body(), .body_hash = body_hash})));
+    data.push_back(std::make_unique<dataset::Dataset>(dataset::Dataset::open(
+        path, {.body = &body.package.body(), .body_hash = body_hash, .origin = origin})));
+    data.back()->leave_out_blank_cameras();
+    if (request.quiet) continue;
+    for (const std::string& remark : data.back()->remarks())
+      std::fprintf(stderr, "figurine-train: %s: %s\n", path.c_str(), remark.c_str());
   }
   const auto describe = [&](size_t person) {
     return describe_run({.command = request.command,

@@ -47,7 +47,9 @@ std::vector<std::pair<size_t, size_t>> choose_views(const dataset::Dataset& data
   std::vector<std::pair<size_t, size_t>> held_out, chosen;
   for (size_t frame = 0; frame < data.frames().size(); ++frame) {
     for (size_t camera = 0; camera < data.cameras().size(); ++camera) {
-      if (data.role(frame, camera) != dataset::Role::kTrain) held_out.emplace_back(frame, camera);
+      const dataset::Role role = data.role(frame, camera);
+      if (role != dataset::Role::kTrain && role != dataset::Role::kMissing)
+        held_out.emplace_back(frame, camera);
     }
   }
   if (held_out.empty()) throw InputError(data.directory() + ": nothing is held out");

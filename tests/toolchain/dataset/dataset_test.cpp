@@ -2,6 +2,8 @@
 // damage.
 #include "toolchain/dataset/dataset.h"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -30,7 +32,7 @@ Dataset open(const std::string& path) {
   return Dataset::open(path, {.body = &body});
 }
 
-TEST(Dataset, HalvesIntrinsicsAndScalesTranslations) {
+TEST(Dataset, HalvesACamerasOwnIntrinsicsAndScalesTranslations) {
   const TemporaryFolder folder;
   write_folder(folder);
   const Dataset data = open(folder.path());
@@ -38,9 +40,9 @@ TEST(Dataset, HalvesIntrinsicsAndScalesTranslations) {
   EXPECT_EQ(camera.width_px, test::kWidth);
   EXPECT_EQ(camera.height_px, test::kHeight);
   EXPECT_EQ(camera.fx_px, 40.0f);
-  EXPECT_EQ(camera.fy_px, 41.0f);
-  EXPECT_EQ(camera.cx_px, 16.5f);
-  EXPECT_EQ(camera.cy_px, 12.5f);
+  EXPECT_EQ(camera.fy_px, 40.0f);
+  EXPECT_EQ(camera.cx_px, 16.0f);
+  EXPECT_EQ(camera.cy_px, 12.0f);
   const std::array<float, 12> expected{1, 0, 0, 0.5f, 0, -1, 0, 1, 0, 0, -1, 3};
   EXPECT_EQ(camera.view_from_world, expected);
 }
@@ -204,16 +206,22 @@ TEST(Dataset, DamageIsNamedWithFileAndField) {
        [](const TemporaryFolder& f) { edit(f / "smplx/smpl/000000.json", "0.3", "null"); },
        {"000000.json", "poses", "not a number"}},
       {"intrinsics of another size",
-       [](const TemporaryFolder& f) { edit(f / "camera_intrinsics.json", "33.0", "1024.0"); },
-       {"camera_intrinsics.json", "principal point"}},
+       [](const TemporaryFolder& f) { edit(f / "camera_extrinsics.json", "[32.0,", "[1024.0,"); },
+       {"camera_extrinsics.json", "image_center", "principal point"}},
+      {"intrinsics transposed",
+       [](const TemporaryFolder& f) {
+         edit(f / "camera_intrinsics.json", "[0.0,0.0,1.0]", "[33.0,25.0,1.0]");
+       },
+       {"camera_intrinsics.json", "intrinsics", "transposed"}},
+      {"a pipe",
+       [](const TemporaryFolder& f) {
+         std::filesystem::remove(f / "camera_scale.pkl");
+         ASSERT_EQ(::mkfifo((f / "camera_scale.pkl").c_str(), 0600), 0);
+       },
+       {"camera_scale.pkl", "regular file"}},
       {"scale zero",
        [](const TemporaryFolder& f) { write_text(f / "camera_scale.pkl", "F0.0\n."); },
        {"camera_scale.pkl", "positive"}},
-      {"missing image",
-       [&](const TemporaryFolder& f) {
-         std::filesystem::remove(f / ("images_lr/" + test::camera_name(2) + "/0010_img.jpg"));
-       },
-       {"0010", "missing"}},
       {"path in a camera's name",
        [](const TemporaryFolder& f) { edit(f / "camera_extrinsics.json", "1_CC", "1_../CC"); },
        {"camera_extrinsics.json", "folder"}},
