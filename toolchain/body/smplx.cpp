@@ -91,7 +91,8 @@ void check_weights(const ports::NpyArray& weights, size_t vertices, const std::s
 }
 
 // Faces without area carry no texels: some are an artist's, more than a tenth are no body.
-void check_faces(const ports::NpyArray& positions, const ports::NpyArray& faces, const std::string& where) {
+void check_faces(const ports::NpyArray& positions, const ports::NpyArray& faces,
+                 const std::string& where) {
   const size_t count = faces.shape[0];
   size_t flat = 0;
   double area_m2 = 0;

@@ -30,8 +30,7 @@ void make_folders(const std::string& path) {
 void run(CheckArguments arguments) {
   while (arguments.data.size() > 1 && arguments.data.ends_with('/')) arguments.data.pop_back();
   if (arguments.output.empty()) arguments.output = arguments.data + "_check";
-  const ports::MappedFile file =
-      value_or_throw(ports::MappedFile::open(arguments.body), "--body");
+  const ports::MappedFile file = value_or_throw(ports::MappedFile::open(arguments.body), "--body");
   const Package package =
       value_or_throw(Package::open(file.bytes(), arguments.body), arguments.body);
   if (package.kind() != PackageKind::kBody)

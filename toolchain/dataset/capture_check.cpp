@@ -91,8 +91,8 @@ ports::ImageU8 silhouette(const Body& body, const PosedPerson& person, const Cam
 // To the nearest pixel inside; the picture's diagonal if there is none.
 double distance_to_mask(const CaptureImage& image, const Point& at) {
   const auto width = static_cast<int64_t>(image.width_px),
-             height = static_cast<int64_t>(image.height_px),
-             x0 = static_cast<int64_t>(at.x), y0 = static_cast<int64_t>(at.y);
+             height = static_cast<int64_t>(image.height_px), x0 = static_cast<int64_t>(at.x),
+             y0 = static_cast<int64_t>(at.y);
   double best = std::hypot(width, height);
   for (int64_t y = 0; y < height; ++y) {
     if (std::abs(static_cast<double>(y - y0)) >= best) continue;
@@ -149,8 +149,7 @@ ViewCheck check_view(const CaptureImage& image, const ports::ImageU8& body,
                  at->y < static_cast<float>(camera.height_px)))
       continue;
     ++seen;
-    const size_t pixel =
-        static_cast<size_t>(at->y) * camera.width_px + static_cast<size_t>(at->x);
+    const size_t pixel = static_cast<size_t>(at->y) * camera.width_px + static_cast<size_t>(at->x);
     if (image.alpha[pixel] >= kInside) {
       ++inside;
     } else {
@@ -193,8 +192,8 @@ ports::ImageU8 overlay(const CaptureImage& image, const ports::ImageU8& body,
                                                 : std::array<int, 3>{255, 60, 40};
     const int weight = on_joint || on_bone ? 255 : body.pixels[i] != 0 ? 96 : 0;
     for (size_t c = 0; c < 3; ++c) {
-      out.pixels[3 * i + c] = static_cast<uint8_t>(
-          (image.rgb[3 * i + c] * (255 - weight) + colour[c] * weight) / 255);
+      out.pixels[3 * i + c] =
+          static_cast<uint8_t>((image.rgb[3 * i + c] * (255 - weight) + colour[c] * weight) / 255);
     }
   }
   return out;
@@ -238,7 +237,8 @@ size_t CaptureCheck::misfits() const {
 CaptureCheck check_capture(
     const Dataset& data, const Body& body, uint32_t frames,
     const std::function<void(const ViewCheck&, const ports::ImageU8&)>& draw) {
-  const size_t all = data.frames().size(), count = frames == 0 ? all : std::min<size_t>(frames, all);
+  const size_t all = data.frames().size(),
+               count = frames == 0 ? all : std::min<size_t>(frames, all);
   Poser poser(body, data.shape());
   CaptureCheck result;
   result.cameras.resize(data.cameras().size());

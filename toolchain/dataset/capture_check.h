@@ -18,18 +18,18 @@ namespace figurine::dataset {
 
 struct ViewCheck {
   size_t frame = 0, camera = 0;
-  double overlap = 0;             // of body and mask: what both cover over what either does
-  double body_in_mask = 0;        // share of the body's pixels
-  double joints_in_mask = 0;      // share of the 22 body joints, of those that fall into the image
-  double joint_distance_px = 0;   // mean over them, to the nearest pixel of the mask
-  double sharpness = 0;           // variance of the Laplacian of the colours inside the mask, 8 bits
+  double overlap = 0;            // of body and mask: what both cover over what either does
+  double body_in_mask = 0;       // share of the body's pixels
+  double joints_in_mask = 0;     // share of the 22 body joints, of those that fall into the image
+  double joint_distance_px = 0;  // mean over them, to the nearest pixel of the mask
+  double sharpness = 0;          // variance of the Laplacian of the colours inside the mask, 8 bits
 };
 
 struct CameraCheck {
   size_t camera = 0;
   size_t views = 0;
-  ViewCheck mean;        // frame and camera without meaning
-  std::string trouble;   // empty: none; else what does not fit, for people
+  ViewCheck mean;       // frame and camera without meaning
+  std::string trouble;  // empty: none; else what does not fit, for people
 };
 
 struct CaptureCheck {

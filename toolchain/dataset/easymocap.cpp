@@ -15,11 +15,17 @@ namespace fs = std::filesystem;
 
 const std::vector<std::string> kEasymocapImages{"images"};
 const std::vector<std::string> kEasymocapMasks{"mask", "masks", "mask-schp", "mask_cihp", "fmask"};
-const std::vector<std::string> kEasymocapPoses{
-    "output/smplx/smplx", "output/smplx/smpl",      "output/smplx",
-    "output/smpl/smpl",   "output/smpl",            "output-smpl-3d/smplfull",
-    "output-smpl-3d/smpl", "output-smplx-3d/smplfull", "smplx/smpl",
-    "smplx",              "smpl"};
+const std::vector<std::string> kEasymocapPoses{"output/smplx/smplx",
+                                               "output/smplx/smpl",
+                                               "output/smplx",
+                                               "output/smpl/smpl",
+                                               "output/smpl",
+                                               "output-smpl-3d/smplfull",
+                                               "output-smpl-3d/smpl",
+                                               "output-smplx-3d/smplfull",
+                                               "smplx/smpl",
+                                               "smplx",
+                                               "smpl"};
 
 std::array<double, 9> rotation_of_vector(const std::vector<double>& v) {
   const double angle = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -40,8 +46,7 @@ class EasymocapReading {
 
   DatasetParts run() {
     if (options_.body == nullptr) {
-      throw InputError(parts_.directory +
-                       ": its poses need a body (the pelvis' rest position)");
+      throw InputError(parts_.directory + ": its poses need a body (the pelvis' rest position)");
     }
     if (options_.body->joint_count() != kSmplxJoints) {
       throw InputError(parts_.directory + ": needs a body of 55 joints, the given one has " +

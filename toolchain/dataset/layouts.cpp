@@ -96,7 +96,8 @@ void match_files(const std::vector<CameraFiles>& files, DatasetParts& parts) {
     std::vector<std::string>&images = parts.images.emplace_back(),
     &masks = parts.masks.emplace_back();
     for (const CaptureFrame& frame : parts.frames) {
-      const auto image = files[c].images.find(frame.number), mask = files[c].masks.find(frame.number);
+      const auto image = files[c].images.find(frame.number),
+                 mask = files[c].masks.find(frame.number);
       const bool there = image != files[c].images.end() && mask != files[c].masks.end();
       images.push_back(there ? image->second : "");
       masks.push_back(there ? mask->second : "");

@@ -52,8 +52,8 @@ void leave_out_blind_cameras(const DatasetOptions& options, const std::string& w
 void take_shape(const std::vector<float>& shapes, const DatasetOptions& options,
                 const std::string& where, DatasetParts& parts);
 
-// k: [3,3] of a camera. Throws InputError "where: reason" unless it is fx 0 cx, 0 fy cy, 0 0 1: other
-// forms (transposed, with skew) would be read wrongly.
+// k: [3,3] of a camera. Throws InputError "where: reason" unless it is fx 0 cx, 0 fy cy, 0 0 1:
+// other forms (transposed, with skew) would be read wrongly.
 void check_intrinsics(const std::vector<double>& k, const std::string& where);
 
 // "3 images" for remarks.

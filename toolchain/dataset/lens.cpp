@@ -44,8 +44,9 @@ Lens make_lens(const std::vector<double>& values, const std::string& where) {
   }
   for (size_t i = 8; i < count; ++i) {
     if (values[i] != 0) {
-      throw InputError(where + ": has thin prism or tilt coefficients, which are not read; only "
-                               "the first 8 may differ from zero");
+      throw InputError(where +
+                       ": has thin prism or tilt coefficients, which are not read; only "
+                       "the first 8 may differ from zero");
     }
   }
   Lens lens;

@@ -29,7 +29,6 @@ FrameSplit parse_split(const JsonField& field) {
   field.fail("unknown split '" + text + "'");
 }
 
-
 // The steps of open(), in their order. Each fills a part of the set or throws; what one step learns
 // that a later one needs, and the set does not, lives here.
 class MvHumanNetReading {
@@ -71,8 +70,7 @@ class MvHumanNetReading {
     set_.body_name = about_["body"]["name"].text();
     set_.body_hash = about_["body"]["hash"].text();
     for (double s : about_["shape"].numbers()) set_.shape.push_back(static_cast<float>(s));
-    for (const JsonField& source : about_["sources"].items())
-      set_.sources.push_back(source.text());
+    for (const JsonField& source : about_["sources"].items()) set_.sources.push_back(source.text());
     const std::string background = about_["background"].text();
     if (background != "black") about_["background"].fail("unknown background '" + background + "'");
     set_.composited_on_black = true;
@@ -156,7 +154,8 @@ class MvHumanNetReading {
     std::string centre_field = intrinsics["intrinsics"].where();
     if (extrinsics.has("focal_length")) {
       const std::vector<double> own = extrinsics["focal_length"].numbers();
-      if (own.empty() || own.size() > 2) extrinsics["focal_length"].fail("is not one or two numbers");
+      if (own.empty() || own.size() > 2)
+        extrinsics["focal_length"].fail("is not one or two numbers");
       fx = own.front(), fy = own.back();
     }
     if (extrinsics.has("image_center")) {
@@ -276,8 +275,7 @@ class MvHumanNetReading {
       if (first.empty()) first = path;
     }
     for (const auto& [number, person] : choose_person(people, folder.string())) {
-      if (set_.frames.empty())
-        take_shape(person.shapes, options_, first + ": shapes", set_);
+      if (set_.frames.empty()) take_shape(person.shapes, options_, first + ": shapes", set_);
       CaptureFrame frame{.number = number, .rotations = {}};
       set_pose(person, root_rest_position(*options_.body, set_.shape), options_.origin, frame);
       set_.frames.push_back(std::move(frame));

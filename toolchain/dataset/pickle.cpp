@@ -161,9 +161,9 @@ class Machine {
         const uint64_t value = little(size);
         const bool negative = size > 0 && (value >> (8 * size - 1) & 1) != 0;
         const int unused = 64 - 8 * size;
-        push(make_number(negative ? static_cast<double>(static_cast<int64_t>(value << unused) >>
-                                                        unused)
-                                  : static_cast<double>(value)));
+        push(make_number(negative
+                             ? static_cast<double>(static_cast<int64_t>(value << unused) >> unused)
+                             : static_cast<double>(value)));
         break;
       }
       case 'N':   // NONE
@@ -303,13 +303,17 @@ class Machine {
   }
 
   void push_global(const std::string& module, const std::string& name) {
-    static const char* const kKnown[] = {
-        "numpy.core.multiarray scalar",         "numpy._core.multiarray scalar",
-        "numpy.core.multiarray _reconstruct",   "numpy._core.multiarray _reconstruct",
-        "numpy.core.numeric _frombuffer",       "numpy._core.numeric _frombuffer",
-        "numpy dtype",                          "numpy ndarray",
-        "_codecs encode",                       "builtins bytearray",
-        "__builtin__ bytearray"};
+    static const char* const kKnown[] = {"numpy.core.multiarray scalar",
+                                         "numpy._core.multiarray scalar",
+                                         "numpy.core.multiarray _reconstruct",
+                                         "numpy._core.multiarray _reconstruct",
+                                         "numpy.core.numeric _frombuffer",
+                                         "numpy._core.numeric _frombuffer",
+                                         "numpy dtype",
+                                         "numpy ndarray",
+                                         "_codecs encode",
+                                         "builtins bytearray",
+                                         "__builtin__ bytearray"};
     const std::string both = module + " " + name;
     for (const char* known : kKnown) {
       if (both == known) return push(make(Kind::kGlobal, both));

@@ -46,8 +46,7 @@ ImageU8 mask_of_colour(const ImageU8& image, const std::string& path) {
     if (p[0] == 0 && p[1] == 0 && p[2] == 0) continue;
     const std::array<uint8_t, 3> here{p[0], p[1], p[2]};
     if (colour && *colour != here) {
-      throw InputError(path +
-                       ": has several colours; a mask is grey, or one colour on black");
+      throw InputError(path + ": has several colours; a mask is grey, or one colour on black");
     }
     colour = here;
     mask.pixels[i] = 255;
@@ -100,9 +99,8 @@ ImageU8 read_colour(const std::string& path) {
   for (size_t i = 0; i < rgb.pixels.size() / 3; ++i) {
     const uint8_t* from = &image.pixels[i * image.channels];
     for (size_t c = 0; c < 3; ++c) {
-      rgb.pixels[3 * i + c] = image.channels == 1
-                                  ? from[0]
-                                  : static_cast<uint8_t>((from[c] * from[3] + 127) / 255);
+      rgb.pixels[3 * i + c] =
+          image.channels == 1 ? from[0] : static_cast<uint8_t>((from[c] * from[3] + 127) / 255);
     }
   }
   return rgb;

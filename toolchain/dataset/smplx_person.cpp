@@ -16,14 +16,14 @@ namespace {
 using Quaternion = std::array<double, 4>;  // wxyz
 using Vector = std::array<double, 3>;
 
-constexpr size_t kBodyNumbers = 66;        // the root and 21 joints
-constexpr size_t kHandNumbers = 45;        // 15 joints
+constexpr size_t kBodyNumbers = 66;                           // the root and 21 joints
+constexpr size_t kHandNumbers = 45;                           // 15 joints
 constexpr size_t kJaw = 22, kLeftHand = 25, kRightHand = 40;  // joints
-constexpr double kMostTurn_rad = 30;       // a rotation vector beyond is in degrees, or damaged
+constexpr double kMostTurn_rad = 30;  // a rotation vector beyond is in degrees, or damaged
 constexpr double kMostDistance_m = 1e5;
 constexpr double kMostShape = 1e3;
-// Of SMPL's mean body, in its own coordinates (2 cm higher or lower with the sex). SMPL-X's is where
-// the body package says.
+// Of SMPL's mean body, in its own coordinates (2 cm higher or lower with the sex). SMPL-X's is
+// where the body package says.
 constexpr Vector kSmplPelvis_m{-0.0018, -0.2233, 0.0282};
 
 // The unit quaternion of a rotation vector.
@@ -177,8 +177,7 @@ std::map<uint32_t, SmplxPerson> choose_person(
     for (const SmplxPerson& person : here) {
       if (by_id && person.id != 0) continue;
       if (!chosen.emplace(number, person).second)
-        throw InputError(folder + ": id: two people of frame " + std::to_string(number) +
-                         " are 0");
+        throw InputError(folder + ": id: two people of frame " + std::to_string(number) + " are 0");
     }
   }
   return chosen;

@@ -30,10 +30,10 @@ struct SmplxPerson {
   std::optional<int64_t> id;
   std::array<double, 4> rotation{1, 0, 0, 0};  // of the root
   std::array<double, 3> translation_m{0, 0, 0};
-  bool about_origin = true;       // Rh, Th; else about the pelvis
-  bool smpl = false;              // of SMPL or SMPL+H, whose shapes are other ones
+  bool about_origin = true;             // Rh, Th; else about the pelvis
+  bool smpl = false;                    // of SMPL or SMPL+H, whose shapes are other ones
   std::array<double, 55 * 3> joints{};  // rotation vectors, SMPL-X's order; the root's is zero
-  std::vector<float> shapes;      // at least 10
+  std::vector<float> shapes;            // at least 10
 };
 
 // Everybody in one file. Throws InputError naming file and field.

@@ -204,8 +204,8 @@ TEST(CaptureCases, SeveralPeopleWithoutId0AreRefused) {
   twice.edit("smplx/smpl/000001.json", add(0, 0));
   EXPECT_NE(input_error([&] { open(twice.path()); }).find("two people"), std::string::npos);
   // One person throughout, under another number: that one.
-  for (const char* file : {"smplx/smpl/000000.json", "smplx/smpl/000001.json",
-                           "smplx/smpl/000002.json"})
+  for (const char* file :
+       {"smplx/smpl/000000.json", "smplx/smpl/000001.json", "smplx/smpl/000002.json"})
     other.edit(file, [](json& j) { j[0]["id"] = 7; });
   EXPECT_EQ(open(other.path()).frames().size(), 3u);
 }

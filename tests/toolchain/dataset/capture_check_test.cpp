@@ -26,9 +26,8 @@ CaptureCheck check(uint32_t shift_px, bool blurred) {
   test::write_folder(folder, settings);
   const Dataset data = Dataset::open(folder.path(), {.body = &mannequin()});
   std::vector<ports::ImageU8> drawn;
-  check_capture(data, mannequin(), 0, [&](const ViewCheck&, const ports::ImageU8& picture) {
-    drawn.push_back(picture);
-  });
+  check_capture(data, mannequin(), 0,
+                [&](const ViewCheck&, const ports::ImageU8& picture) { drawn.push_back(picture); });
   EXPECT_EQ(drawn.size(), 3u);
   for (size_t c = 0; c < drawn.size(); ++c) {
     ports::ImageU8 mask(test::kWidth, test::kHeight, 1), image(test::kWidth, test::kHeight, 3);

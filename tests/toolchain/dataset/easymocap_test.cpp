@@ -33,7 +33,8 @@ const char* const kIntri =
     "dist_01: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ 0., 0., 0., 0., 0. ]\n"
     "K_02: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
     "   data: [ 40, 0, 15.5, 0, 40, 11.5, 0, 0, 1 ]\n"
-    "dist_02: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ -0.1, 0., 0., 0., 0. ]\n";
+    "dist_02: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ -0.1, 0., 0., 0., 0. "
+    "]\n";
 // The second camera half a turn about y behind the person, as rotation vector alone.
 const char* const kExtri =
     "%YAML:1.0\r\n---\r\nnames:\r\n- '01'\r\n- '02'\r\n"
@@ -46,7 +47,8 @@ const char* const kExtri =
     "  data: [0., 0., 3.141592653589793]\r\n"
     "T_02: !!opencv-matrix\r\n  rows: 3\r\n  cols: 1\r\n  dt: d\r\n  data: [0., 1., 3.]\r\n";
 
-json person(size_t numbers, std::vector<double> rh = {0, 0, 0}, std::vector<double> th = {0, 0, 0}) {
+json person(size_t numbers, std::vector<double> rh = {0, 0, 0},
+            std::vector<double> th = {0, 0, 0}) {
   std::vector<double> poses(numbers, 0.0);
   poses[(numbers == 63 || numbers == 69 ? 0 : 3) + 3 * 3 + 1] = 0.4;  // joint 4 about y
   return {{"id", 0},
