@@ -1,4 +1,5 @@
 // A BVH as a tree of moving nodes.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -32,6 +33,15 @@ class BvhTree : public ClipTree {
       moved.push_back(turns);
       // Some exporters write positions of zero where they mean "at the offset".
       placed_.push_back(joint.parent < 0 || is_placed);
+      const bool has_positions =
+          std::any_of(joint.channels.begin(), joint.channels.end(),
+                      [](BvhChannel channel) { return channel <= BvhChannel::kZPosition; });
+      const bool has_offset = joint.offset != std::array<double, 3>{0, 0, 0};
+      at_offset_ += has_positions && has_offset && !placed_.back();
+    }
+    if (at_offset_ > 0) {
+      note += (note.empty() ? "" : "; ") + std::to_string(at_offset_) +
+              " joints with positions of zero stay at their offsets";
     }
   }
 
@@ -75,6 +85,7 @@ class BvhTree : public ClipTree {
 
   Bvh bvh_;
   std::vector<bool> placed_;  // by its position channels
+  size_t at_offset_ = 0;      // joints whose position channels say nothing
 };
 
 }  // namespace

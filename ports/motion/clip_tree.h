@@ -33,7 +33,8 @@ class ClipTree {
   std::vector<bool> moved;  // by the animation that is chosen
   double frames_per_second = 0;
   uint32_t frames = 0;
-  std::string note;  // what was odd about the file, in words; empty: nothing
+  uint32_t animation = 0;  // glTF: that is read
+  std::string note;        // what was odd about the file, in words; empty: nothing
 
   // Looks at the joints alone: errors of other nodes do not matter. Sets rate and frames. Call
   // once, before the poses.

@@ -151,6 +151,7 @@ void parse_nodes(const Field& root, Gltf& gltf) {
       children[i].push_back(static_cast<uint32_t>(child.count()));
     }
   }
+  if (!root.ok()) return;  // with two parents below it, the order would have no end
   for (uint32_t i = 0; i < gltf.nodes.size(); ++i) {
     if (gltf.nodes[i].parent < 0) gltf.order.push_back(i);
   }

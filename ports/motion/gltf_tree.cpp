@@ -48,9 +48,8 @@ class GltfTree : public ClipTree {
       first = std::min(first, double{track.times_s.front()});
       last = std::max(last, double{track.times_s.back()});
     }
-    const std::string animation = where + ": animations[" + std::to_string(gltf_.animation) + "]: ";
-    if (last < 0)
-      return Status(StatusCode::kCorrupt, animation + "moves none of the skeleton's joints");
+    const std::string name = where + ": animations[" + std::to_string(gltf_.animation) + "]: ";
+    if (last < 0) return Status(StatusCode::kCorrupt, name + "moves none of the skeleton's joints");
     frames_per_second = double{options.frames_per_second};
     if (!(frames_per_second >= 1 && frames_per_second <= 240))
       return Status(StatusCode::kInvalidArgument, "fps: not within 1 and 240");
@@ -59,7 +58,7 @@ class GltfTree : public ClipTree {
     // little early.
     const double count = std::floor((last - first) * frames_per_second + 1e-3) + 1;
     if (count > kMaxClipFrames)
-      return Status(StatusCode::kLimitExceeded, animation + "more than 2^18 frames");
+      return Status(StatusCode::kLimitExceeded, name + "more than 2^18 frames");
     frames = static_cast<uint32_t>(count);
     return {};
   }
@@ -77,6 +76,7 @@ class GltfTree : public ClipTree {
   void take(Gltf gltf) {
     gltf_ = std::move(gltf);
     where = gltf_.where;
+    animation = gltf_.animation;
     human_bones = gltf_.human_bones;
     names.clear();
     parents.clear();

@@ -61,7 +61,7 @@ std::string file_name(const std::string& path) {
 }
 
 Provenance provenance_of(const ImportSettings& settings, const MotionClip& clip, ClipKind kind,
-                         const std::array<uint64_t, 2>& body_hash) {
+                         uint32_t animation, const std::array<uint64_t, 2>& body_hash) {
   const RetargetOptions& retarget = settings.retarget;
   const bool is_gltf = kind == ClipKind::kGltf;
   Provenance provenance;
@@ -76,7 +76,7 @@ Provenance provenance_of(const ImportSettings& settings, const MotionClip& clip,
     provenance.settings.push_back({name, value});
   };
   if (settings.head_pitch_deg) add("head_pitch_deg", std::to_string(*settings.head_pitch_deg));
-  if (is_gltf) add("animation", std::to_string(retarget.animation.value_or(0)));
+  if (is_gltf) add("animation", std::to_string(animation));
   if (retarget.source_fps) add("source_fps", std::to_string(*retarget.source_fps));
   if (retarget.up) add("up", to_string(*retarget.up));
   if (!settings.map.empty()) add("map", file_name(settings.map));
@@ -124,16 +124,23 @@ std::vector<ImportOption> import_options(ImportSettings& settings) {
       0, 0.5f, "seconds from 0 to 0.5", retarget.smooth_s));
   options.push_back(
       {"--neutral",
-       "The T-pose is the first frame, the zero pose (glTF: of the nodes), or told by the bones' "
-       "axes (glTF: axes); default: the one that is a T-pose",
+       "The T-pose is the first frame, the zero pose (glTF: of the nodes), a frame by its number, "
+       "or "
+       "told by the bones' axes (glTF: axes); default: the one that is a T-pose",
        false, [&retarget](const std::string& text) -> Status {
-         constexpr const char* kNames[] = {"first", "zero", "axes"};
-         for (size_t i = 0; i < std::size(kNames); ++i) {
-           if (text != kNames[i]) continue;
-           retarget.neutral = static_cast<Neutral>(i);
-           return {};
+         if (text == "first") {
+           retarget.neutral = Neutral::kFirstFrame;
+         } else if (text == "zero") {
+           retarget.neutral = Neutral::kZeroPose;
+         } else if (text == "axes") {
+           retarget.neutral = Neutral::kBoneAxes;
+         } else if (const auto frame = number<uint32_t>(text, 0, UINT32_MAX - 1, ""); frame.ok()) {
+           retarget.neutral = Neutral::kFrame;
+           retarget.neutral_frame = *frame;
+         } else {
+           return wrong("'" + text + "': neither first, zero, axes nor a frame's number");
          }
-         return wrong("'" + text + "': none of first, zero and axes");
+         return {};
        }});
   options.push_back(number_option<uint32_t>(
       "--animation",
@@ -204,7 +211,7 @@ Result<ImportedMotion> import_motion(const ImportSettings& settings, const figur
     clip = with_head_pitch(std::move(clip).value(), *settings.head_pitch_deg / kDegrees);
     if (!clip.ok()) return clip.status();
   }
-  out.provenance = provenance_of(settings, *clip, *kind, body_hash);
+  out.provenance = provenance_of(settings, *clip, *kind, report.animation, body_hash);
   Result<std::string> source = settings.source;
   if (settings.source.empty()) source = clip_source(settings.clip);
   if (!source.ok()) return source.status();

@@ -7,6 +7,7 @@
 namespace figurine::ports {
 namespace {
 
+constexpr uint32_t kMaxFrames = 1u << 19;  // 460 MB
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kMaxToeBendRad =
     35 * kDegree;  // the capture's toe markers swap now and then: toes do not bend further
@@ -347,6 +348,8 @@ Result<MotionClip> retarget(RetargetSource source, const figurine::Body& body,
                    std::to_string(available) + " from frame " + std::to_string(start) + " on at " +
                    std::to_string(options.frames_per_second) + " a second");
   }
+  const uint32_t count = options.frames.value_or(available);
+  if (count > kMaxFrames) return refused("more than 2^19 frames of the result");
   smooth(source, double{options.smooth_s.value_or(source.smooth_s)} * source.frames_per_second);
 
   const std::array<Quat, kJointCount> align = alignments(body, source);
@@ -362,7 +365,7 @@ Result<MotionClip> retarget(RetargetSource source, const figurine::Body& body,
   MotionClip clip;
   clip.name = options.name;
   clip.frames_per_second = options.frames_per_second;
-  clip.frame_count = options.frames.value_or(available);
+  clip.frame_count = count;
   const Sampler sampler{source.frames};
   Vec3 origin = Vec3(0);  // the path starts over the body's rest place
   for (uint32_t f = 0; f < clip.frame_count; ++f) {

@@ -33,6 +33,7 @@ namespace figurine::ports {
 enum class Neutral : uint8_t {
   kFirstFrame,  // frame 0
   kZeroPose,    // BVH: the hierarchy itself, all rotations zero; glTF: the nodes' own transforms
+  kFrame,       // the one that RetargetOptions::neutral_frame counts
   kBoneAxes,    // glTF: none, but its joints' axes lie in the bones as in the rig that bone_axes.h
                 // describes
 };
@@ -55,6 +56,7 @@ struct RetargetOptions {
   // bone axes if they are the known rig's, else the zero pose, else the first frame, if they are
   // T-poses; VRM's animations and models the zero pose.
   std::optional<Neutral> neutral;
+  uint32_t neutral_frame = 0;  // of the clip (glTF: at the result's rate)
   // Standard deviation of a Gaussian over time that takes the capture's jitter out; 0: none.
   // Default: kCaptureSmoothS, and none for glTF, whose keys an animator or a tool has cleaned.
   std::optional<float> smooth_s;
@@ -72,6 +74,7 @@ struct RetargetReport {
   float lowest_sole_m = 0;     // of all frames, after grounding
   float mean_contact_m = 0;    // mean over frames of |height of the lowest sole|
   float largest_step_rad = 0;  // largest rotation of a joint between neighbouring frames
+  uint32_t animation = 0;      // glTF: that was read
   std::string summary;         // one line of words: what was read, and how it was taken
 };
 

@@ -161,6 +161,19 @@ class TreeRetargeting {
     if (first_defect.empty() && zero_defect.empty()) first_defect = bent_back(first, zero);
     std::string axes_defect;
     if (kind_.is_gltf) axes_defect = not_the_known_rig(tree_, joints_, first_);
+    if (options_.neutral == Neutral::kFrame) {
+      if (options_.neutral_frame >= tree_.frames) {
+        return Status(StatusCode::kInvalidArgument,
+                      tree_.where + ": neutral: frame " + std::to_string(options_.neutral_frame) +
+                          ": the clip has " + std::to_string(tree_.frames) + " frames");
+      }
+      Result<WorldPose> chosen = tree_.at(options_.neutral_frame);
+      if (!chosen.ok()) return chosen.status();
+      first_ = std::move(chosen).value();
+      const std::string defect = try_neutral(Neutral::kFrame, world_up, neutral_);
+      note_ = defect.empty() ? "" : "no T-pose: " + defect;
+      return {};
+    }
     const auto take = [&](NeutralPose& pose, const std::string& note) {
       neutral_ = std::move(pose);
       note_ = note;
@@ -188,7 +201,7 @@ class TreeRetargeting {
       if (first_defect.empty()) return take(first, "");
       if (zero_defect.empty()) return take(zero, "the first frame is none: " + first_defect);
       return refused("no T-pose: of the first frame " + first_defect + ", of the zero pose " +
-                     zero_defect + "; --neutral first or zero takes one as it is");
+                     zero_defect + "; --neutral first, zero or a frame takes one as it is");
     }
     if (!tree_.human_bones.empty() && options_.map.empty())
       return take(zero, zero_defect.empty() ? "" : "no T-pose: " + zero_defect);
@@ -197,7 +210,7 @@ class TreeRetargeting {
     if (first_defect.empty()) return take(first, "");
     return refused("no T-pose: of the nodes " + zero_defect + ", of the first frame " +
                    first_defect + ", and by the bones' axes " + axes_defect +
-                   "; --neutral zero or first takes one as it is");
+                   "; --neutral zero, first or a frame takes one as it is");
   }
 
   // R(neutral)^T of a joint, once its pose stands upright.
@@ -285,6 +298,7 @@ class TreeRetargeting {
     Result<MotionClip> clip = retarget(std::move(source), body_, options_,
                                        options_.start.value_or(skip_first ? 1 : 0), &report);
     report.summary = summary;
+    report.animation = tree_.animation;
     if (clip.ok() && report_out != nullptr) *report_out = report;
     return clip;
   }
@@ -295,8 +309,9 @@ class TreeRetargeting {
                   tree_.frames_per_second);
     std::string out = text;
     out += std::string(", up ") + to_string(up_) + (up_is_seen_ ? " (as the person stands)" : "");
-    constexpr const char* kNeutrals[] = {"first frame", "zero pose", "bone axes"};
-    out += std::string(", T-pose from the ") + kNeutrals[static_cast<size_t>(neutral_.which)];
+    const std::string frame = "frame " + std::to_string(options_.neutral_frame);
+    const std::string neutrals[] = {"the first frame", "the zero pose", frame, "the bone axes"};
+    out += ", T-pose from " + neutrals[static_cast<size_t>(neutral_.which)];
     if (!note_.empty()) out += " (" + note_ + ")";
     out += ", names of " + joints_.naming;
     if (known_[kHead]) {

@@ -18,12 +18,14 @@ from results import read
 from sharp_report import row
 
 PRESETS = {"paper": "body_paper.fgn", "edge": "body.fgn"}
+SIZE = "750x1024"  # of the training images
 RUNS = 3  # of figurine bench a package, by turns
 
 
 def bench(figurine, package, body, folder):
     report = pathlib.Path(folder) / "bench.json"
     command = [figurine, "bench", package, "--body", body, "--threads", "1", "--frames", "10"]
+    command += ["--size", SIZE]
     subprocess.run([*command, "--json", report], check=True, stdout=subprocess.DEVNULL)
     (run,) = read(report)["runs"]
     return {stage: times["median"] for stage, times in run["stages_ms"].items()}

@@ -135,8 +135,10 @@ void run_capture(CaptureOptions options) {
   }
   std::vector<ports::MotionClip> motions;
   for (const std::string& path : options.motions) {
+    ports::RetargetReport report;
     motions.push_back(value_or_throw(ports::read_clip(
-        path, package.body(), {.name = std::filesystem::path(path).stem().string()})));
+        path, package.body(), {.name = std::filesystem::path(path).stem().string()}, &report)));
+    if (!report.summary.empty()) std::printf("%s: %s\n", path.c_str(), report.summary.c_str());
     const std::string source = value_or_throw(ports::clip_source(path));
     // Once, however many motions come from the same clip.
     const bool known =

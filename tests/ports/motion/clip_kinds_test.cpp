@@ -177,7 +177,7 @@ TEST(ClipNeutral, WithoutAnyTPoseTheOptionIsNamed) {
   }
   const Read seen = read(person);
   EXPECT_TRUE(seen.fails("no T-pose: of the first frame its ")) << seen.error;
-  EXPECT_TRUE(seen.fails("--neutral first or zero takes one as it is")) << seen.error;
+  EXPECT_TRUE(seen.fails("--neutral first, zero or a frame takes one as it is")) << seen.error;
   // An A-pose of the hierarchy is one, of the motion it may be a person who stands about.
   MadePerson a_pose;
   a_pose.t_pose_first = false;
@@ -196,6 +196,24 @@ TEST(ClipNeutral, WithoutAnyTPoseTheOptionIsNamed) {
   EXPECT_TRUE(seen_a.says("T-pose from the zero pose")) << seen_a.summary << seen_a.error;
   const auto joints = joints_of(shipped_body(), seen_a.clip, 9);
   EXPECT_NEAR(bone(joints, kLeftShoulder, kLeftElbow).y, -std::sin(1.4), 0.01);
+}
+
+TEST(ClipNeutral, AnyFrameMayBeTheTPose) {
+  MadePerson person;  // bent, but for one frame
+  person.t_pose_first = false;
+  person.pose = [](int f) {
+    std::map<std::string, Quat> pose = MadePerson::walk(f);
+    if (f == 7) return std::map<std::string, Quat>{};
+    pose["Spine"] = about({1, 0, 0}, 0.5);
+    return pose;
+  };
+  const Read seventh =
+                 read(person, {.neutral = Neutral::kFrame, .neutral_frame = 7, .smooth_s = 0}),
+             zero = read(person, {.neutral = Neutral::kZeroPose, .smooth_s = 0});
+  EXPECT_TRUE(seventh.says("T-pose from frame 7, ")) << seventh.summary << seventh.error;
+  EXPECT_LT(apart(seventh.clip, zero.clip), 1e-5);
+  EXPECT_TRUE(read(person, {.neutral = Neutral::kFrame, .neutral_frame = 20})
+                  .fails("neutral: frame 20: the clip has 20 frames"));
 }
 
 TEST(ClipRates, NoFrameIsLostToMissingDigits) {
@@ -537,7 +555,7 @@ TEST(ImportOptions, SayWhatIsWrongWithThem) {
   EXPECT_EQ(set("--up", "-z"), "");
   EXPECT_EQ(settings.retarget.up, ClipUp::kMinusZ);
   EXPECT_EQ(set("--up", "w"), "'w': none of y, z, x, -y, -z and -x");
-  EXPECT_EQ(set("--neutral", "second"), "'second': none of first, zero and axes");
+  EXPECT_EQ(set("--neutral", "second"), "'second': neither first, zero, axes nor a frame's number");
   EXPECT_EQ(set("--head-pitch", "-20"), "");
   EXPECT_EQ(settings.head_pitch_deg, -20);
   EXPECT_EQ(set("--start", "-1"), "'-1': not a frame's number");

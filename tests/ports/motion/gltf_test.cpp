@@ -245,6 +245,11 @@ TEST(Gltf, NamesFieldAndReason) {
       {[](auto& g) { g.json["nodes"][0]["children"] = {1, 1}; },
        "nodes[0].children[1]: node 1 has two parents"},
       {[](auto& g) { g.json["nodes"][1]["children"] = {0}; }, "nodes: children go in a circle"},
+      {[](auto& g) {  // and a circle besides
+         g.json["nodes"][0]["children"] = {1, 1};
+         g.json["nodes"][1]["children"] = {1};
+       },
+       "nodes[0].children[1]: node 1 has two parents"},
       {[](auto& g) { g.json["nodes"][0]["translation"] = {1, 2}; },
        "nodes[0].translation: 2 numbers, expected 3"},
       {[](auto& g) { g.json["nodes"][0]["translation"] = {1, "x", 2}; },

@@ -55,8 +55,8 @@ MotionClip retarget_npz(const std::string& path, const Body& body, const Retarge
   return value_or_throw(ports::read_clip(path, body, options, report));
 }
 
-MotionClip make_loop(const MotionClip& clip, const ports::LoopOptions& options,
-                     LoopReport* report = nullptr) {
+MotionClip looped(const MotionClip& clip, const ports::LoopOptions& options,
+                  LoopReport* report = nullptr) {
   return value_or_throw(ports::make_loop(clip, options, report));
 }
 
@@ -279,7 +279,7 @@ float largest_step(const MotionClip& clip, uint32_t from, uint32_t to) {
 TEST(MotionLoop, RepeatsWithoutASeamAndWalksStraight) {
   const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 76});
   LoopReport report;
-  const MotionClip loop = make_loop(clip, {.cycles = 3}, &report);
+  const MotionClip loop = looped(clip, {.cycles = 3}, &report);
   const uint32_t length = report.length;
   ASSERT_EQ(loop.frame_count, 3 * length);
   std::printf("cycle of %u frames, gap %.1f degrees\n", length, 57.3 * double{report.gap_rad});
@@ -310,7 +310,7 @@ TEST(MotionLoop, RepeatsWithoutASeamAndWalksStraight) {
 
 TEST(MotionLoop, InPlaceStaysInPlace) {
   const MotionClip clip = retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 76});
-  const MotionClip loop = make_loop(clip, {.cycles = 2, .in_place = true});
+  const MotionClip loop = looped(clip, {.cycles = 2, .in_place = true});
   for (size_t i = 0; i < loop.root_translation_m.size(); ++i) {
     if (i % 3 != 1) {
       EXPECT_LT(std::abs(loop.root_translation_m[i]), 0.08);
@@ -318,10 +318,9 @@ TEST(MotionLoop, InPlaceStaysInPlace) {
   }
   const MotionClip short_clip =
       retarget_bvh(clip_0103(), texels().view(), {.start = 1, .frames = 20, .name = "short"});
-  EXPECT_NE(test::input_error([&] {
-              make_loop(short_clip, {});
-            }).find("short: loop: 20 frames are too few"),
-            std::string::npos);
+  EXPECT_NE(
+      test::input_error([&] { looped(short_clip, {}); }).find("short: loop: 20 frames are too few"),
+      std::string::npos);
 }
 
 TEST(MotionClip, SurvivesThePackage) {
@@ -370,9 +369,9 @@ TEST(RetargetBits, CapturesAreWhatTheyWere) {
   EXPECT_EQ(hash(read("01_03.bvh", {.frames = 50, .neutral = Neutral::kZeroPose})),
             "0285a94c821e98936d2882c97a410622");
   const MotionClip walk = read("01_03.bvh", {.start = 1, .frames = 76});
-  EXPECT_EQ(hash(make_loop(walk, {.cycles = 3})), "de77fddb530161ec632ef8280dcdfde4");
+  EXPECT_EQ(hash(looped(walk, {.cycles = 3})), "de77fddb530161ec632ef8280dcdfde4");
   EXPECT_EQ(hash(value_or_throw(
-                ports::with_head_pitch(make_loop(walk, {.cycles = 2, .in_place = true}), 0))),
+                ports::with_head_pitch(looped(walk, {.cycles = 2, .in_place = true}), 0))),
             "eb64c48c43eb3ef78b4a3a546569317b");
   EXPECT_NE(value_or_throw(ports::clip_source(folder + "01_03.bvh")).find("mocap.cs.cmu.edu"),
             std::string::npos);
