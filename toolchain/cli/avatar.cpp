@@ -42,6 +42,7 @@ struct AvatarArguments {
       perceptual_window;
   std::optional<uint32_t> network_rank;
   bool freeze_pose = false, freeze_network = false;
+  double checkpoint_s = train::TrainRequest{}.checkpoint_period_s;
   uint32_t threads = 0;  // 0: all cores, with --all one
   uint32_t slots = 0;    // 0: as many as the threads leave cores for
 };
@@ -188,6 +189,7 @@ train::TrainRequest make_request(const AvatarArguments& arguments,
                               .command = train::current_command(),
                               .resume = arguments.resume,
                               .quiet = arguments.quiet};
+  request.checkpoint_period_s = arguments.checkpoint_s;
   if (data.size() > 1) request.more_data.assign(data.begin() + 1, data.end());
   if (arguments.resume && fs::exists(train::RunDirectory{run}.run_json())) {
     const train::RunDescription old = train::read_run({run});
@@ -351,6 +353,10 @@ void add_avatar_command(CLI::App& app) {
                     "Every identity of the folder; one that fails does not stop the others");
   command->add_flag("--resume", arguments->resume,
                     "Go on from the last checkpoint, by the run's own settings");
+  command
+      ->add_option("--checkpoint-seconds", arguments->checkpoint_s,
+                   "Between two checkpoints (default 30)")
+      ->check(CLI::NonNegativeNumber);
   command->add_flag("--quiet", arguments->quiet, "No progress, no summary");
   command->add_option("--preset", arguments->preset, "Size of the network (default edge)")
       ->check(CLI::IsMember({"nano", "edge", "fine", "paper"}));

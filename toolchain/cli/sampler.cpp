@@ -147,6 +147,10 @@ void add_sampler_command(CLI::App& app) {
       ->check(CLI::Range(1.0, 1e6));
   command->add_flag("--resume", request.resume,
                     "Go on from the run's checkpoint, by the run's own settings");
+  command
+      ->add_option("--checkpoint-seconds", request.checkpoint_period_s,
+                   "Between two checkpoints (default 60), or 20 times what one takes")
+      ->check(CLI::NonNegativeNumber);
   command->add_flag("--quiet", request.quiet, "No progress, no summary");
   command->callback([arguments] { run(*arguments); });
 }
