@@ -92,9 +92,9 @@ class Avatar:
 
     def command(self, folder, resume):
         if resume and (folder / "run.json").exists():
-            return ["avatar", "--run", folder, "--resume"]
+            return ["avatar", "-o", folder, "--resume"]
         return ["avatar", "--data", self.tools.captures / "000000", "--body", self.tools.body,
-                "--run", folder, "--preset", "nano", "--uv", 32, "--iterations", 60,
+                "-o", folder, "--preset", "nano", "--uv", 32, "--iterations", 60,
                 "--threads", 1, "--checkpoint-seconds", 0.2]
 
     def end(self, folder):
