@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Trainings, populations and packing killed at random moments, resumed, and compared to the bit with
+"""Trainings, populations and packing killed at random moments, resumed, compared to the bit with
 undisturbed runs.
 
     kills.py TRAIN INSPECT REPOSITORY [--each N] [--seed S] [--programs avatar,...]
