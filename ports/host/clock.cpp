@@ -12,6 +12,12 @@ uint64_t now_ns() {
                                    .count());
 }
 
+uint64_t thread_cpu_ns() {
+  timespec spent{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &spent);
+  return static_cast<uint64_t>(spent.tv_sec) * 1'000'000'000 + static_cast<uint64_t>(spent.tv_nsec);
+}
+
 // steady_clock is CLOCK_MONOTONIC on Linux, so that the time needs no conversion; the C++ library's
 // sleep_until may ask for the time again and sleep for a difference.
 void sleep_until(uint64_t time_ns) {

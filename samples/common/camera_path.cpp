@@ -108,6 +108,53 @@ Result<Camera> camera_of_file(const CameraPathOptions& options, const Camera& go
 
 }  // namespace
 
+Result<FramedOrbit> frame_figures(const CameraPathOptions& options,
+                                  std::span<const uint32_t> frames, Scene& scene,
+                                  Renderer& renderer) {
+  FIG_CHECK(!options.camera.fixed, "a camera of a file frames by itself");
+  const Camera& golden = scene.avatar(0).avatar.golden.camera;
+  if (options.framing != Framing::kBody) {
+    for (size_t m = 0; m < scene.size(); ++m) {
+      const Result<std::vector<uint8_t>> joints =
+          framed_joints(scene.body(m).package.body(), options.framing);
+      if (!joints.ok()) return joints.status();
+    }
+  }
+  const ImageSize size = options.size.value_or(ImageSize{golden.width_px, golden.height_px});
+  const double aspect = static_cast<double>(size.width_px) / size.height_px;
+  // An orbit that stays sees the path in world coordinates.
+  FramedOrbit framed{options.camera.orbit.value_or(OrbitCamera{}),
+                     std::vector<Point>(frames.size(), {0, 0, 0})};
+  if (options.follow) {
+    const double rate = options.frames_per_second.value_or(
+        scene.frames_per_second() / (frames.size() > 1 ? frames[1] - frames[0] : 1));
+    framed.path = smooth_path(figures_path(frames, options.framing, scene),
+                              kFollowSigma_s[static_cast<size_t>(options.framing)] * rate);
+  }
+  const Result<std::vector<Point>> points =
+      sample_points(frames, framed.path, options.framing, scene, renderer);
+  if (!points.ok()) return points.status();
+
+  FramingOptions framing;
+  const Point centre = robust_centre(*points, framing.share);
+  OrbitCamera& orbit = framed.orbit;
+  // Whole figures turn about their root; a face is where it is.
+  const bool about_root = options.follow && options.framing == Framing::kBody;
+  orbit.target_m = about_root ? Point{0, centre[1], 0} : centre;
+  if (options.camera.orbit) return framed;
+  scene.pose(frames[0]);
+  orbit.azimuth_deg = mean_heading_deg(scene) + kDefaultTurn_deg;
+  orbit.elevation_deg = kDefaultElevation_deg[static_cast<size_t>(options.framing)];
+  orbit.vertical_fov_deg = kDefaultFov_deg[static_cast<size_t>(options.framing)];
+  orbit.distance_m = fit_distance_m(*points, orbit, aspect, framing);
+  for (size_t i = 1; options.turntable && i < kTurntableViews; ++i) {
+    OrbitCamera turned = orbit;
+    turned.azimuth_deg += turn_deg(i, kTurntableViews);
+    orbit.distance_m = std::max(orbit.distance_m, fit_distance_m(*points, turned, aspect, framing));
+  }
+  return framed;
+}
+
 Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
                                              std::span<const uint32_t> frames, Scene& scene,
                                              Renderer& renderer) {
@@ -121,51 +168,14 @@ Result<std::vector<Camera>> make_camera_path(const CameraPathOptions& options,
     if (!camera.ok()) return camera.status();
     return std::vector<Camera>(frames.size(), *camera);
   }
-  if (options.framing != Framing::kBody) {
-    for (size_t m = 0; m < scene.size(); ++m) {
-      const Result<std::vector<uint8_t>> joints =
-          framed_joints(scene.body(m).package.body(), options.framing);
-      if (!joints.ok()) return joints.status();
-    }
-  }
+  const Result<FramedOrbit> framed = frame_figures(options, frames, scene, renderer);
+  if (!framed.ok()) return framed.status();
   const ImageSize size = options.size.value_or(ImageSize{golden.width_px, golden.height_px});
-  const double aspect = static_cast<double>(size.width_px) / size.height_px;
-  std::vector<Point> path(frames.size(),
-                          {0, 0, 0});  // an orbit that stays sees the path in world coordinates
-  if (options.follow) {
-    const double rate = options.frames_per_second.value_or(
-        scene.frames_per_second() / (frames.size() > 1 ? frames[1] - frames[0] : 1));
-    path = smooth_path(figures_path(frames, options.framing, scene),
-                       kFollowSigma_s[static_cast<size_t>(options.framing)] * rate);
-  }
-  const Result<std::vector<Point>> points =
-      sample_points(frames, path, options.framing, scene, renderer);
-  if (!points.ok()) return points.status();
-
-  FramingOptions framing;
-  const Point centre = robust_centre(*points, framing.share);
-  OrbitCamera orbit = options.camera.orbit.value_or(OrbitCamera{});
-  // Whole figures turn about their root; a face is where it is.
-  const bool about_root = options.follow && options.framing == Framing::kBody;
-  orbit.target_m = about_root ? Point{0, centre[1], 0} : centre;
-  if (!options.camera.orbit) {
-    scene.pose(frames[0]);
-    orbit.azimuth_deg = mean_heading_deg(scene) + kDefaultTurn_deg;
-    orbit.elevation_deg = kDefaultElevation_deg[static_cast<size_t>(options.framing)];
-    orbit.vertical_fov_deg = kDefaultFov_deg[static_cast<size_t>(options.framing)];
-    orbit.distance_m = fit_distance_m(*points, orbit, aspect, framing);
-    for (size_t i = 1; options.turntable && i < kTurntableViews; ++i) {
-      OrbitCamera turned = orbit;
-      turned.azimuth_deg += turn_deg(i, kTurntableViews);
-      orbit.distance_m =
-          std::max(orbit.distance_m, fit_distance_m(*points, turned, aspect, framing));
-    }
-  }
   std::vector<Camera> cameras;
   for (size_t i = 0; i < frames.size(); ++i) {
-    OrbitCamera here = orbit;
+    OrbitCamera here = framed->orbit;
     if (options.turntable) here.azimuth_deg += turn_deg(i, frames.size());
-    for (size_t k = 0; k < 3; ++k) here.target_m[k] += path[i][k];
+    for (size_t k = 0; k < 3; ++k) here.target_m[k] += framed->path[i][k];
     Result<Camera> camera = make_orbit_camera(here, size.width_px, size.height_px);
     if (!camera.ok()) return camera.status();
     if (options.near_m) camera->near_m = *options.near_m;

@@ -26,6 +26,16 @@ struct CameraPathOptions {
   bool turntable = false;  // an orbit goes round once in all frames
 };
 
+// An orbit that frames the figures, and what it goes along with.
+struct FramedOrbit {
+  OrbitCamera orbit;        // its target relative to path
+  std::vector<Point> path;  // of each frame; zeros where the orbit stays
+};
+// options.camera.fixed must be none (FIG_CHECK). Otherwise as make_camera_path().
+Result<FramedOrbit> frame_figures(const CameraPathOptions& options,
+                                  std::span<const uint32_t> frames, Scene& scene,
+                                  Renderer& renderer);
+
 // kUnsupported for a close-up of a body without a head joint, kInvalidArgument for one, or
 // a turntable, with a camera that a file fixes. The scene must have been added to the renderer,
 // which poses it in a few frames to see how large it is. frames is not empty.

@@ -120,7 +120,7 @@ Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name,
   const auto [path, member] = split_member(name);
   Result<std::unique_ptr<LoadedPackage>> package = load_package(path, options);
   if (!package.ok()) return package.status();
-  auto loaded = std::make_unique<LoadedAvatar>(LoadedAvatar{name, std::move(*package), {}, {}});
+  auto loaded = std::make_unique<LoadedAvatar>(LoadedAvatar{name, std::move(*package), {}, {}, {}});
   const Package& opened = loaded->package->package;
   if (opened.kind() == PackageKind::kPopulation) {
     FIG_RETURN_IF_ERROR(open_population_member(opened.population(), path, member, *loaded));

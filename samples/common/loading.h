@@ -30,10 +30,11 @@ Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path,
 
 // An avatar from a package of its own, or a member of a population.
 struct LoadedAvatar {
-  std::string name;                        // as it was asked for: "person.fgn", "people.fgn#17"
-  std::unique_ptr<LoadedPackage> package;  // that it came from
-  std::vector<float> storage;              // of a member's weights
-  Avatar avatar;                           // points into both
+  std::string name;                          // as it was asked for: "person.fgn", "people.fgn#17"
+  std::unique_ptr<LoadedPackage> package;    // that it came from; null: it is no file
+  std::vector<float> storage;                // of a member's weights
+  std::shared_ptr<const void> made_of = {};  // of an avatar that is no file: what it borrows from
+  Avatar avatar;                             // points into both
 };
 
 // "PATH" of an avatar, or "PATH#MEMBER" of a population, MEMBER a name or a number counted from 0.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "samples/common/quaternion.h"
 
@@ -163,6 +164,62 @@ Result<Scene::Figure> Scene::load_figure(const SceneOptions& options, size_t ind
   return figure;
 }
 
+Status Scene::add_figure(const Newcomer& newcomer) {
+  const Body& body = newcomer.body->package.body();
+  Figure figure;
+  figure.avatar = newcomer.avatar, figure.body = newcomer.body;
+  figure.place = newcomer.place;
+  figure.rest_joints_m = rest_joints(figure.avatar->avatar, body);
+  figure.rotations.resize(size_t(body.joint_count()) * 4);
+  figures_.push_back(std::move(figure));
+  posed_.emplace_back();
+  const Status fits = set_motion(figures_.size() - 1, newcomer.motion);
+  if (!fits.ok()) remove_figure(figures_.size() - 1);
+  return fits;
+}
+
+void Scene::remove_figure(size_t figure) {
+  figures_.erase(figures_.begin() + static_cast<std::ptrdiff_t>(figure));
+  posed_.erase(posed_.begin() + static_cast<std::ptrdiff_t>(figure));
+  find_length();
+}
+
+void Scene::swap_figures(size_t a, size_t b) {
+  std::swap(figures_[a], figures_[b]);
+  std::swap(posed_[a], posed_[b]);
+  find_length();
+}
+
+Status Scene::set_motion(size_t index, const std::shared_ptr<LoadedPackage>& motion) {
+  Figure& figure = figures_[index];
+  if (motion) {
+    const Status fits =
+        check_motion_fits_body(motion->package.motion(), figure.body->package.body());
+    if (!fits.ok()) return fits.within(motion->path + " on " + figure.avatar->name);
+  }
+  figure.motion = motion;
+  if (motion) {
+    figure.source = std::make_unique<MotionPoses>(motion->package.motion());
+  } else {
+    figure.source = std::make_unique<StillPose>(figure.recorded_pose(0));
+  }
+  figure.swaying = std::make_unique<SwayPoses>(figure.recorded_pose(0));
+  find_length();
+  return {};
+}
+
+// Of the shortest motion, at the rate of the first.
+void Scene::find_length() {
+  frame_count_ = 1, frames_per_second_ = 30;
+  bool first = true;
+  for (const Figure& figure : figures_) {
+    if (!figure.motion) continue;
+    const Motion& clip = figure.motion->package.motion();
+    frame_count_ = first ? clip.frame_count : std::min(frame_count_, clip.frame_count);
+    if (std::exchange(first, false)) frames_per_second_ = clip.frames_per_second;
+  }
+}
+
 Result<Scene> Scene::load(const SceneOptions& options) {
   FIG_RETURN_IF_ERROR(check_counts(options));
   const size_t count = options.avatars.size() * options.crowd;
@@ -170,14 +227,9 @@ Result<Scene> Scene::load(const SceneOptions& options) {
   for (size_t i = 0; i < count; ++i) {
     Result<Figure> figure = load_figure(options, i, scene.figures_);
     if (!figure.ok()) return figure.status();
-    if (figure->motion) {
-      const Motion& clip = figure->motion->package.motion();
-      scene.frame_count_ =
-          i == 0 ? clip.frame_count : std::min(scene.frame_count_, clip.frame_count);
-      if (i == 0) scene.frames_per_second_ = clip.frames_per_second;
-    }
     scene.figures_.push_back(std::move(*figure));
   }
+  scene.find_length();
   scene.posed_.resize(count);
   return scene;
 }
@@ -198,17 +250,22 @@ Result<std::vector<uint32_t>> Scene::frames(const FrameRange& range) const {
 }
 
 Status Scene::add_to(Renderer& renderer, std::optional<Precision> precision) {
-  for (size_t i = 0; i < figures_.size(); ++i) {
-    const Result<AvatarId> id =
-        renderer.add_avatar(figures_[i].avatar->avatar, figures_[i].body->package, precision);
-    if (!id.ok()) return id.status().within(figures_[i].avatar->name);
-    posed_[i].avatar = *id;
-    if (!figures_[i].coarse) continue;
-    const Result<AvatarId> coarse =
-        renderer.add_avatar(figures_[i].coarse->avatar, figures_[i].coarse_body->package);
-    if (!coarse.ok()) return coarse.status().within(figures_[i].coarse->name);
-    posed_[i].coarse = *coarse;
-  }
+  for (size_t i = 0; i < figures_.size(); ++i)
+    FIG_RETURN_IF_ERROR(add_figure_to(renderer, i, precision));
+  return {};
+}
+
+Status Scene::add_figure_to(Renderer& renderer, size_t index, std::optional<Precision> precision) {
+  const Figure& figure = figures_[index];
+  const Result<AvatarId> id =
+      renderer.add_avatar(figure.avatar->avatar, figure.body->package, precision);
+  if (!id.ok()) return id.status().within(figure.avatar->name);
+  posed_[index].avatar = *id;
+  if (!figure.coarse) return {};
+  const Result<AvatarId> coarse =
+      renderer.add_avatar(figure.coarse->avatar, figure.coarse_body->package);
+  if (!coarse.ok()) return coarse.status().within(figure.coarse->name);
+  posed_[index].coarse = *coarse;
   return {};
 }
 

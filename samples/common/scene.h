@@ -37,6 +37,24 @@ class Scene {
   // Loads and checks everything; nothing later can fail on data.
   static Result<Scene> load(const SceneOptions& options);
 
+  // Nobody; add_figure() brings somebody.
+  Scene() = default;
+  struct Newcomer {
+    std::shared_ptr<LoadedAvatar> avatar;
+    std::shared_ptr<LoadedPackage> body;    // that the avatar was made for
+    std::shared_ptr<LoadedPackage> motion;  // null: stands in the golden pose
+    Placement place;
+  };
+  // The last figure from now on, of whom the renderer knows nothing yet (add_to, add_figure_to).
+  // kMismatch if the motion does not fit the body; nothing has changed then.
+  Status add_figure(const Newcomer& newcomer);
+  // Those behind it move up. Their renderer is the caller's to tell.
+  void remove_figure(size_t figure);
+  void swap_figures(size_t a, size_t b);
+  // As in a newcomer, of a figure that stays; null: the golden pose again.
+  Status set_motion(size_t figure, const std::shared_ptr<LoadedPackage>& motion);
+  void set_place(size_t figure, const Placement& place) { figures_[figure].place = place; }
+
   size_t size() const { return figures_.size(); }
   bool moves() const { return frame_count_ > 1; }
   uint32_t frame_count() const { return frame_count_; }  // of the shortest motion; 1 without
@@ -49,6 +67,8 @@ class Scene {
   // Adds every avatar, in the precision asked for or the best that it holds. Identities are kept in
   // order, one renderer at a time.
   Status add_to(Renderer& renderer, std::optional<Precision> precision);
+  Status add_figure_to(Renderer& renderer, size_t figure, std::optional<Precision> precision);
+  AvatarId id(size_t figure) const { return posed_[figure].avatar; }  // in the last renderer
   // What the avatars run in: "f32", "q8", or "mixed".
   std::string precision(const Renderer& renderer) const;
   // Whether every avatar holds it.
@@ -94,6 +114,7 @@ class Scene {
   static Status load_coarse(const SceneOptions& options, size_t index,
                             std::span<const Figure> others, Figure& figure);
   void place_figure(size_t figure, const PoseView& pose);
+  void find_length();
 
   std::vector<Figure> figures_;
   std::vector<FrameAvatar> posed_;

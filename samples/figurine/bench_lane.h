@@ -12,9 +12,9 @@
 #include "samples/common/device_options.h"
 #include "samples/common/frame_log.h"
 #include "samples/common/framing.h"
+#include "samples/common/gaussian_scene.h"
 #include "samples/common/rendered_frame.h"
 #include "samples/common/scene.h"
-#include "samples/figurine/gaussian_scene.h"
 #include "samples/figurine/roofline.h"
 
 namespace figurine::samples {

@@ -9,9 +9,9 @@
 #include "ports/gaussians/ply.h"
 #include "ports/host/files.h"
 #include "samples/common/device_options.h"
+#include "samples/common/gaussian_scene.h"
 #include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/gaussian_scene.h"
 
 namespace figurine::samples {
 

@@ -16,9 +16,9 @@
 #include "ports/media/png.h"
 #include "samples/common/device_options.h"
 #include "samples/common/frame_log.h"
+#include "samples/common/image_error.h"
 #include "samples/common/progress.h"
 #include "samples/common/rendered_frame.h"
-#include "samples/figurine/image_error.h"
 #include "samples/figurine/report_files.h"
 #include "samples/figurine/report_page.h"
 

@@ -13,12 +13,12 @@
 #include "figurine/avatar_sampler.h"
 #include "ports/media/png.h"
 #include "samples/common/device_options.h"
+#include "samples/common/image_error.h"
 #include "samples/common/loading.h"
 #include "samples/common/progress.h"
 #include "samples/common/rendered_frame.h"
 #include "samples/common/scene.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/image_error.h"
 
 namespace figurine::samples {
 

@@ -9,10 +9,10 @@
 #include "samples/common/device_options.h"
 #include "samples/common/file_sink.h"
 #include "samples/common/frame_log.h"
+#include "samples/common/gaussian_scene.h"
 #include "samples/common/machine.h"
 #include "samples/common/rendered_frame.h"
 #include "samples/figurine/commands.h"
-#include "samples/figurine/gaussian_scene.h"
 
 namespace figurine::samples {
 

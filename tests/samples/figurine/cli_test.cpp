@@ -10,7 +10,7 @@
 #include "ports/media/png.h"
 #include "runtime/test_packages.h"
 #include "samples/common/camera_spec.h"
-#include "samples/figurine/image_error.h"
+#include "samples/common/image_error.h"
 #include "samples/program.h"
 
 namespace figurine::tests::cli_test {

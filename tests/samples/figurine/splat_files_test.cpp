@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "ports/media/pfm.h"
-#include "samples/figurine/image_error.h"
+#include "samples/common/image_error.h"
 #include "samples/program.h"
 
 namespace figurine::tests::splat_files_test {

@@ -1,4 +1,4 @@
-#include "samples/figurine/image_error.h"
+#include "samples/common/image_error.h"
 
 #include <algorithm>
 #include <cmath>

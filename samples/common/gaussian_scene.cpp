@@ -1,4 +1,4 @@
-#include "samples/figurine/gaussian_scene.h"
+#include "samples/common/gaussian_scene.h"
 
 #include <algorithm>
 #include <cmath>
