@@ -18,11 +18,10 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "figurine/frame.h"
 #include "figurine/status.h"
-#include "ports/v4l2/system.h"
+#include "ports/v4l2/device.h"
 
 namespace figurine::ports {
 
@@ -39,13 +38,9 @@ class V4l2Output {
   };
   // Opens the device and agrees with it on everything; shows nothing yet.
   static Result<std::unique_ptr<V4l2Output>> open(const std::string& path, const Options& options);
-  ~V4l2Output();
-  V4l2Output(const V4l2Output&) = delete;
-  V4l2Output& operator=(const V4l2Output&) = delete;
-
   PixelFormat format() const { return format_; }
   size_t stride_bytes() const { return stride_bytes_; }
-  size_t buffer_count() const { return buffers_.size(); }
+  size_t buffer_count() const { return device_.buffer_count(); }
 
   // Gives the driver a frame: rows of format() without padding, chroma of NV12 behind the luma,
   // exactly as many bytes as that is (FIG_CHECK). Waits for a free buffer until deadline_ns; false
@@ -55,31 +50,18 @@ class V4l2Output {
   uint64_t broken_buffers() const { return broken_; }
 
  private:
-  struct Buffer {
-    void* memory = nullptr;
-    size_t size = 0;
-    bool queued = false;
-  };
-  V4l2Output(std::string path, const Options& options);
-  Status failed(const std::string& what) const;  // with errno's reason
-  int control(unsigned long request, void* argument) const;
+  V4l2Output(const std::string& path, const Options& options);
   Status check_device();
   Status agree_on_format();
   Status try_format(PixelFormat format, bool& agreed);
-  Status agree_on_rate();
-  Status take_buffers();
   // The number of a buffer that is free, or -1 at the deadline.
   Result<int> free_buffer(uint64_t deadline_ns);
   void copy(std::span<const uint8_t> pixels, std::byte* to) const;
 
-  std::string path_;
   Options options_;
-  VideoSystem& system_;
-  int descriptor_ = -1;
+  V4l2Device device_;
   PixelFormat format_ = PixelFormat::kYuyv;
   size_t stride_bytes_ = 0, size_bytes_ = 0;
-  std::vector<Buffer> buffers_;
-  bool streaming_ = false;
   uint64_t broken_ = 0;
 };
 

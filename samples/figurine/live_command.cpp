@@ -26,7 +26,7 @@ struct LiveOptions {
   DeviceOptions device;
   OmissionOptions omissions;
   std::string pose, output, camera, size, background = "#dbe0e6", follow = "smooth",
-                                          framing = "body", json;
+                                          framing = "body", behind, json;
   std::optional<float> near_m;
   double frames_per_second = 30;
   std::optional<uint64_t> frames;
@@ -137,6 +137,13 @@ nlohmann::ordered_json describe(const LiveOptions& options, const LiveRun& run,
   json["output"] = options.output;
   json["size"] = {loop.size.width_px, loop.size.height_px};
   json["pixel_format"] = to_string(loop.sink.format());
+  if (loop.behind != nullptr) {
+    const Backdrop::Counts counts = loop.behind->counts();
+    json["behind"] = {{"device", loop.behind->path()},
+                      {"pictures", counts.pictures},
+                      {"broken", counts.broken},
+                      {"lost", counts.lost}};
+  }
   json["frames_per_second"] = options.frames_per_second;
   json["seconds"] = run.seconds;
   json["ended_by"] = to_string(run.end);
@@ -204,11 +211,19 @@ Status run_live_command(LiveOptions options) {
   Result<LiveOutput> output = LiveOutput::open(
       options.output, {.size = size, .frames_per_second = options.frames_per_second});
   if (!output.ok()) return output.status();
+  std::unique_ptr<Backdrop> behind;
+  if (!options.behind.empty()) {
+    Result<std::unique_ptr<Backdrop>> camera_behind = Backdrop::open(
+        options.behind, {.size = size, .frames_per_second = options.frames_per_second});
+    if (!camera_behind.ok()) return camera_behind.status().within("behind");
+    behind = std::move(*camera_behind);
+  }
   if (feed != nullptr) feed->start();
 
   LiveLoop loop{.scene = *scene,
                 .renderer = **renderer,
                 .sink = output->sink(),
+                .behind = behind.get(),
                 .feed = feed,
                 .camera = FollowCamera(*camera, place, follows(plan->camera_path)),
                 .size = size,
@@ -297,6 +312,9 @@ Command add_live_command(CLI::App& app) {
       ->add_option("--background", options->background,
                    "black, grey, white, #RRGGBB or R,G,B; #00b140 for a chroma key")
       ->capture_default_str();
+  command->add_option("--behind", options->behind,
+                      "/dev/videoN, a camera whose picture stands behind the figures in place of "
+                      "the background, cut to the frame's shape");
   command->add_option("--json", options->json, "summary as JSON to this file (- for stdout)");
   options->device.add_to(*command, false);
   options->omissions.add_to(*command);

@@ -20,24 +20,39 @@ Status wait_until(uint64_t then_ns) {
   return check_interrupt();
 }
 
-Status draw(LiveLoop& loop, double time_s, RenderedFrame& frame) {
+// The frame that the sink gets, and what it is made of where a camera's picture is behind.
+struct Pictures {
+  explicit Pictures(const LiveLoop& loop)
+      : frame(loop.size, loop.sink.format()),
+        figures(loop.behind == nullptr ? ImageSize{0, 0} : loop.size, PixelFormat::kRgba8) {}
+  RenderedFrame frame, figures;
+  ports::ImageU8 scratch;
+};
+
+Status draw(LiveLoop& loop, double time_s, Pictures& pictures) {
   const Result<std::span<const FrameAvatar>> posed = loop.scene.pose_at(time_s);
   if (!posed.ok()) return posed.status();
   const Camera& camera = loop.camera.step(mean_place(loop.scene), 1 / loop.frames_per_second);
-  ImageTarget target = frame.target();
+  const bool over = loop.behind != nullptr;
+  ImageTarget target = over ? pictures.figures.target() : pictures.frame.target();
   target.matrix = loop.sink.matrix();
-  return loop.renderer.render({.camera = camera,
-                               .avatars = *posed,
-                               .background = loop.background,
-                               .leave_out = loop.leave_out,
-                               .approximation = loop.approximation},
-                              target);
+  Frame frame{.camera = camera,
+              .avatars = *posed,
+              .leave_out = loop.leave_out,
+              .approximation = loop.approximation};
+  if (!over) frame.background = loop.background;
+  FIG_RETURN_IF_ERROR(loop.renderer.render(frame, target));
+  if (over) {
+    compose(pictures.figures, loop.behind->newest().get(), loop.background, loop.sink.matrix(),
+            pictures.scratch, pictures.frame);
+  }
+  return {};
 }
 
 // Everything but how it ended, into run.
 Status run_ticks(LiveLoop& loop, LiveRun& run) {
-  RenderedFrame frame(loop.size, loop.sink.format());
-  FIG_RETURN_IF_ERROR(draw(loop, 0, frame));
+  Pictures pictures(loop);
+  FIG_RETURN_IF_ERROR(draw(loop, 0, pictures));
   const uint64_t start_ns = ports::now_ns();
   std::optional<uint64_t> last_pose_ns;
   for (; !loop.ticks || run.ticks < *loop.ticks; ++run.ticks) {
@@ -59,9 +74,9 @@ Status run_ticks(LiveLoop& loop, LiveRun& run) {
       }
     }
     const uint64_t begin_ns = ports::now_ns();
-    FIG_RETURN_IF_ERROR(draw(loop, time_s, frame));
+    FIG_RETURN_IF_ERROR(draw(loop, time_s, pictures));
     const uint64_t drawn_ns = ports::now_ns();
-    const Result<bool> shown = loop.sink.show(frame, due_ns);
+    const Result<bool> shown = loop.sink.show(pictures.frame, due_ns);
     if (!shown.ok()) return shown.status();
     if (!*shown) continue;
     run.rendering.add(drawn_ns - begin_ns);

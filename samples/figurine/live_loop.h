@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "figurine/renderer.h"
+#include "samples/common/backdrop.h"
 #include "samples/common/follow_camera.h"
 #include "samples/common/latency_histogram.h"
 #include "samples/common/live_sink.h"
@@ -23,7 +24,8 @@ struct LiveLoop {
   Scene& scene;
   Renderer& renderer;
   LiveSink& sink;
-  PoseFeed* feed = nullptr;  // null: recorded poses, whose own time is that of arrival
+  Backdrop* behind = nullptr;  // null: the background colour alone
+  PoseFeed* feed = nullptr;    // null: recorded poses, whose own time is that of arrival
   FollowCamera camera;
   ImageSize size;
   std::array<float, 3> background{};

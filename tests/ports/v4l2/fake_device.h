@@ -5,6 +5,7 @@
 #include <linux/videodev2.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -33,6 +34,16 @@ class FakeDevice final : public ports::VideoSystem {
   uint32_t wrong_index = 0;  // added to a buffer's number when it is given back
   uint32_t flags = 0;        // of buffers that are given back
   bool shows = true;         // gives buffers back at once
+
+  // A camera, in place of an output: what it gives, a buffer each, in order.
+  struct Given {
+    std::vector<uint8_t> bytes;
+    uint32_t buffer_flags = 0;
+  };
+  void become_camera() { device_caps = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING; }
+  std::deque<Given> given;
+  std::map<uint32_t, uint32_t> largest_width;        // by format; others: any
+  uint32_t colorspace = 0, encoding = 0, range = 0;  // that it states
 
   // Error number at the nth next call (0: this one) of open, map, poll or a request; later calls
   // too if forever.
@@ -66,9 +77,10 @@ class FakeDevice final : public ports::VideoSystem {
   int unmap(void*, size_t) override { return ++unmapped, 0; }
   int poll(pollfd& waiting, int) override {
     if (fails(kPoll)) return -1;
-    waiting.revents = queue_.empty() ? 0 : POLLOUT;
+    const bool ready = is_camera() ? !given.empty() : !queue_.empty();
+    waiting.revents = ready ? waiting.events : 0;
     ++polls;
-    return queue_.empty() ? 0 : 1;
+    return ready ? 1 : 0;
   }
   int polls = 0;
 
@@ -119,8 +131,19 @@ class FakeDevice final : public ports::VideoSystem {
       case VIDIOC_DQBUF: {
         auto& buffer = *static_cast<v4l2_buffer*>(argument);
         if (queue_.empty() || !shows) return errno = EAGAIN, -1;
+        if (is_camera()) {
+          if (given.empty()) return errno = EAGAIN, -1;
+          std::vector<uint8_t>& memory = buffers_.at(queue_.front());
+          const Given& next = given.front();
+          std::copy_n(next.bytes.begin(), std::min(next.bytes.size(), memory.size()),
+                      memory.begin());
+          buffer.bytesused = static_cast<uint32_t>(next.bytes.size());
+          buffer.flags = next.buffer_flags;
+          given.pop_front();
+        } else {
+          buffer.flags = flags;
+        }
         buffer.index = queue_.front() + wrong_index;
-        buffer.flags = flags;
         queue_.pop_front();
         return 0;
       }
@@ -152,9 +175,21 @@ class FakeDevice final : public ports::VideoSystem {
     return true;
   }
 
+  bool is_camera() const { return (device_caps & V4L2_CAP_VIDEO_CAPTURE) != 0; }
+
   int set_format(v4l2_pix_format& pix) {
     if (only_width != 0) pix.width = only_width;
+    if (const auto most = largest_width.find(pix.pixelformat); most != largest_width.end())
+      pix.width = std::min(pix.width, most->second);
+    if (is_camera())
+      pix.colorspace = colorspace, pix.ycbcr_enc = encoding, pix.quantization = range;
     if (insists_on_format != 0) pix.pixelformat = insists_on_format;
+    if (pix.pixelformat == V4L2_PIX_FMT_MJPEG && is_camera()) {
+      pix.bytesperline = 0;
+      pix.sizeimage = 100000 - sizeimage_off;
+      agreed = pix;
+      return 0;
+    }
     const bool nv12 = pix.pixelformat == V4L2_PIX_FMT_NV12;
     const uint32_t bytes = nv12 ? 1 : pix.pixelformat == V4L2_PIX_FMT_YUYV ? 2 : 3;
     pix.bytesperline = pix.width * bytes + stride_padding;

@@ -1,9 +1,9 @@
 // The whole user space of a virtual machine that tries ports/v4l2 on a real kernel driver: the
 // first process, linked statically, in an initramfs of itself and the modules of `vivid`, the
 // kernel's virtual video device. Loads them, sends frames of every format and size out and reads
-// them back through vivid's loop from output to input, lets vivid fail in every way that it can,
-// prints a line a check and "RESULT passed P failed F", and switches the machine off. vivid_test.py
-// is the outside of it.
+// them back through vivid's loop from output to input, by itself and through the port, lets vivid
+// fail in every way that it can, prints a line a check and "RESULT passed P failed F", and switches
+// the machine off. vivid_test.py is the outside of it.
 #include <fcntl.h>
 #include <linux/videodev2.h>
 #include <poll.h>
@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "ports/host/clock.h"
+#include "ports/v4l2/v4l2_capture.h"
 #include "ports/v4l2/v4l2_output.h"
 
 namespace figurine::tests {
@@ -261,6 +262,45 @@ void frames_come_back(const std::string& output, const Node& out, const Node& in
   }
 }
 
+// What goes out as YUYV comes in as a picture, in the colours that both sides agree on.
+void pictures_come_in(const std::string& output, const std::string& input, const Node& out,
+                      const Node& in) {
+  constexpr uint32_t kWidth = 640, kHeight = 480;
+  check(out.set_timings(kWidth, kHeight) && in.set_timings(kWidth, kHeight), "timings of a camera");
+  auto sink = open_output(output, kWidth, kHeight, PixelFormat::kYuyv);
+  auto camera = ports::V4l2Capture::open(input, {.width_px = kWidth, .height_px = kHeight});
+  check(sink.ok() && camera.ok(), "a camera opens " + camera.status().message());
+  if (!sink.ok() || !camera.ok()) return;
+  check((*camera)->width_px() == kWidth && (*camera)->height_px() == kHeight, "of that size");
+  check_says(ports::V4l2Capture::open(input, {}).status(), "in use by another program");
+  const std::vector<uint8_t> pixels = pattern(size_t{2} * kWidth, kHeight, 5);
+  const ports::YcbcrRows rows(YcbcrMatrix::kBt601, false);
+  ports::ImageU8 wanted(kWidth, kHeight, 3), picture;
+  for (uint32_t y = 0; y < kHeight; ++y)
+    rows.yuyv(&pixels[size_t{2} * kWidth * y], kWidth, wanted.at(0, y));
+  int same = 0, read = 0;
+  for (int i = 0; i < 40 && same < 2; ++i) {
+    const Result<bool> shown = (*sink)->show(pixels, ports::now_ns() + 2 * kSecond_ns);
+    if (!shown.ok() || !*shown) break;
+    const Result<bool> came = (*camera)->next(picture, ports::now_ns() + 2 * kSecond_ns);
+    if (!came.ok()) break;
+    read += *came;
+    same += *came && picture.pixels == wanted.pixels;
+  }
+  check(same >= 2, "pictures come in to the bit (" + std::to_string(same) + " of " +
+                       std::to_string(read) + ")");
+  check(in.set("Inject V4L2_BUF_FLAG_ERROR", 1), "control: a broken picture");
+  bool sound = true;
+  for (int i = 0; i < 30 && sound && (*camera)->broken_pictures() == 0; ++i)
+    sound = (*camera)->next(picture, ports::now_ns() + kSecond_ns).ok();
+  check(sound && (*camera)->broken_pictures() > 0, "a broken picture is counted and no error");
+  check(in.set("Inject Fatal Streaming Error", 1), "control: the camera fails");
+  Result<bool> came = true;
+  for (int i = 0; i < 30 && came.ok(); ++i)
+    came = (*camera)->next(picture, ports::now_ns() + kSecond_ns);
+  check_says(came.status(), "Input/output error");
+}
+
 // Frames until the device says no, a second's worth at most.
 Status show_until_refused(ports::V4l2Output& sink, std::span<const uint8_t> pixels) {
   for (int i = 0; i < 60; ++i) {
@@ -330,6 +370,7 @@ void run() {
   check(in.set_last("Is Connected To") || out.set("Loop Video", 1) || in.set("Loop Video", 1),
         "output and input are connected");
   frames_come_back(output, out, in);
+  pictures_come_in(output, input, out, in);
   it_says_why(output, input, out);
 }
 

@@ -278,6 +278,10 @@ TEST_F(LiveCommand, BadInputGetsOneLineAndNoFile) {
   refused("--pose motion.fgn --background alpha -o x.y4m", 1, "chroma key");
   refused("--pose motion.fgn --json - -o -", 1, "cannot both have standard output");
   refused("--pose motion.fgn --camera none.json -o x.y4m", 1, "none.json");
+  refused("--pose motion.fgn --behind /dev/video7777 -o x.y4m", 1,
+          "behind: /dev/video7777: cannot be opened for reading");
+  refused("--pose motion.fgn --behind /dev/null -o x.y4m", 1,
+          "behind: /dev/null: is no video device");
   refused("-o x.y4m", 2, "--pose");
   refused("--pose motion.fgn", 2, "--output");
   refused("--pose motion.fgn --fps 0 -o x.y4m", 2, "--fps");
