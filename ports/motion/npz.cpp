@@ -150,8 +150,8 @@ Result<Header> parse_header(std::span<const std::byte> bytes, uint64_t size_byte
   FIG_RETURN_IF_ERROR(parse_shape(*shape, where, header));
   for (size_t extent : header.shape) {
     if (extent != 0 && header.count > kMaxValues / extent) {
-      return Status(StatusCode::kLimitExceeded,
-                    where + ": shape " + shape_text(header.shape) + ": more than 2^26 values");
+      return Status(StatusCode::kLimitExceeded, where + ": shape " + shape_text(header.shape) +
+                                                    " declares more than 2^26 values");
     }
     header.count *= extent;
   }

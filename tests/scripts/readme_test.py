@@ -89,7 +89,8 @@ class Readme(unittest.TestCase):
 
     def test_commands_work_in_the_order_of_the_page(self):
         with tempfile.TemporaryDirectory() as folder:
-            os.symlink(ROOT / "samples", pathlib.Path(folder, "samples"))
+            for name in ("samples", "tests"):
+                os.symlink(ROOT / name, pathlib.Path(folder, name))
             os.mkdir(pathlib.Path(folder, "out"))
             for command in tool_commands():
                 small = command
