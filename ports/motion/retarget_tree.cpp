@@ -24,7 +24,6 @@ struct NeutralPose {
   Neutral which = Neutral::kFirstFrame;
   WorldPose pose;
   Quat upright = no_turn();  // stands it upright, facing +z
-  bool is_t_pose = false;
 };
 
 class TreeRetargeting {
@@ -116,10 +115,8 @@ class TreeRetargeting {
     // The zero pose need not stand as the motion does; the first frame is part of it.
     out.upright =
         which == Neutral::kZeroPose ? upright_by_itself(places) : facing_forward(places, world_up);
-    const std::string defect = no_t_pose(places, known_, out.upright,
-                                         which == Neutral::kZeroPose ? kAPoseDrop : kTPoseDrop);
-    out.is_t_pose = defect.empty();
-    return defect;
+    return no_t_pose(places, known_, out.upright,
+                     which == Neutral::kZeroPose ? kAPoseDrop : kTPoseDrop);
   }
 
   // How far the first frame's trunk or head is turned from the zero pose's, if that is too far for
