@@ -11,7 +11,7 @@ namespace figurine::samples {
 
 namespace {
 
-constexpr float kOpacitySeen = 0.1f;
+constexpr float kOpacityThatShows = 0.1f;
 constexpr float kSigmas = 3;
 constexpr double kMassShare = 0.9;
 constexpr float kReach = 3;         // times the distance within which that share lies
@@ -34,7 +34,7 @@ struct Extent {
   glm::vec3 centre, half;
 };
 
-float quantile(std::vector<float> values, double share) {
+float value_at(std::vector<float> values, double share) {
   const auto rank =
       values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), rank, values.end());
@@ -45,9 +45,9 @@ float quantile(std::vector<float> values, double share) {
 std::vector<Extent> visible_extents(const GaussianCloud& cloud, const glm::mat3& turn) {
   std::vector<Extent> extents;
   const bool any = std::any_of(cloud.opacity.begin(), cloud.opacity.end(),
-                               [](float opacity) { return opacity >= kOpacitySeen; });
+                               [](float opacity) { return opacity >= kOpacityThatShows; });
   for (uint32_t i = 0; i < cloud.count(); ++i) {
-    if (any && !(cloud.opacity[i] >= kOpacitySeen)) continue;
+    if (any && !(cloud.opacity[i] >= kOpacityThatShows)) continue;
     const float* factor = &cloud.covariance_factor[9 * size_t(i)];
     glm::vec3 deviation;
     for (int k = 0; k < 3; ++k)
@@ -65,19 +65,19 @@ void keep_the_scene(std::vector<Extent>& extents) {
   std::vector<float> values(extents.size());
   for (int k = 0; k < 3; ++k) {
     for (size_t i = 0; i < values.size(); ++i) values[i] = extents[i].centre[k];
-    middle[k] = quantile(values, 0.5);
+    middle[k] = value_at(values, 0.5);
   }
   const auto distance = [&](const Extent& extent) {
     const glm::vec3 d = extent.centre - middle;
     return std::hypot(d.x, d.y, d.z);
   };
   for (size_t i = 0; i < values.size(); ++i) values[i] = distance(extents[i]);
-  float mass = quantile(values, kMassShare);
+  float mass = value_at(values, kMassShare);
   for (size_t i = 0; i < values.size(); ++i) {
     const glm::vec3& half = extents[i].half;
     values[i] = std::max({half.x, half.y, half.z});
   }
-  mass = std::max(mass, quantile(values, kMassShare));  // a scene may be in one place
+  mass = std::max(mass, value_at(values, kMassShare));  // a scene may be in one place
   if (!(mass > 0)) return;
   std::erase_if(extents,
                 [&](const Extent& extent) { return !(distance(extent) <= kReach * mass); });
