@@ -33,10 +33,14 @@ static int is_due(void) {
 
 static int fails(int may_be_interrupted) {
   if (!is_due()) return 0;
-  if (is_kind("enospc")) errno = ENOSPC;
-  else if (is_kind("eio")) errno = EIO;
-  else if (is_kind("eintr") && may_be_interrupted) errno = EINTR;
-  else return 0;
+  if (is_kind("enospc"))
+    errno = ENOSPC;
+  else if (is_kind("eio"))
+    errno = EIO;
+  else if (is_kind("eintr") && may_be_interrupted)
+    errno = EINTR;
+  else
+    return 0;
   return 1;
 }
 
