@@ -184,7 +184,11 @@ class Campaign:
             row["ended_before"] += 1
         error = process.communicate()[1].decode(errors="replace")
         what = f"{row['program']}, {row['signal']}"
-        if process.returncode > 0 and error.count("\n") != 1:
+        # A population names every member that failed.
+        lines = error.splitlines()
+        one = isinstance(program, Population) or len(lines) == 1
+        if process.returncode > 0 and not (
+                one and all(line.startswith("figurine-train: ") for line in lines)):
             self.find(row, "not_one_line", f"{what}: {error!r}")
         time.sleep(0.1)
         before = files_of(folder) if folder.exists() else set()
