@@ -21,8 +21,8 @@ class GltfTree : public ClipTree {
            n = parents[static_cast<size_t>(n)])
         needed_[static_cast<size_t>(n)] = true;
     }
-    const auto moves_it = [&](size_t animation) {
-      return std::any_of(gltf_.moved[animation].begin(), gltf_.moved[animation].end(),
+    const auto moves_it = [&](size_t number) {
+      return std::any_of(gltf_.moved[number].begin(), gltf_.moved[number].end(),
                          [&](uint32_t node) { return needed_[node]; });
     };
     if (!options.animation && !moves_it(gltf_.animation)) {

@@ -332,7 +332,7 @@ TEST(SmplFiles, EveryLayoutIsTheSameMotion) {
     for (uint32_t f = 0; f < 12; ++f) {
       const auto one = joints_of(shipped_body(), whole, f),
                  two = joints_of(shipped_body(), other.clip, f);
-      const size_t joints = hands ? kJointCount : kJaw;
+      const size_t joints = hands ? size_t{kJointCount} : size_t{kJaw};
       for (size_t j = 0; j < joints; ++j) largest = std::max(largest, length(one[j] - two[j]));
     }
     EXPECT_LT(largest, 1e-4) << what;

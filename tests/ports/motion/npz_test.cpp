@@ -46,7 +46,9 @@ TEST(Npy, EveryPrefixAndSurplusIsRefused) {
       std::string changed = sound;
       changed[i] = static_cast<char>(changed[i] ^ flip);
       const Result<NpyArray> array = parse_npy(bytes_of(changed), "a");
-      if (array.ok()) EXPECT_LE(array->values.size(), 24u);
+      if (array.ok()) {
+        EXPECT_LE(array->values.size(), 24u);
+      }
     }
   }
 }
