@@ -3,6 +3,7 @@
 // that make a sound avatar.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <set>
 
@@ -74,8 +75,11 @@ Status read_member_table(const schema::Member& table, size_t quality_count, Popu
   out.split = static_cast<Split>(table.split());
   FIG_RETURN_IF_ERROR(read_maps_and_head(table, "avatar", out));
   if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden_view(*table.golden(), out.golden));
-  if (const auto* quality = table.quality(); quality != nullptr)
-    out.quality.assign(quality->begin(), quality->end());
+  if (const auto* quality = table.quality(); quality != nullptr && quality->size() > 0) {
+    // By bytes: the Verifier wants no alignment of a vector's elements, and a forged one has none.
+    out.quality.resize(quality->size());
+    std::memcpy(out.quality.data(), quality->Data(), out.quality.size() * sizeof(double));
+  }
   if (out.quality.size() != quality_count)
     return corrupt("quality", "has ", out.quality.size(), " figures for ", quality_count, " names");
   for (const double value : out.quality) {
