@@ -3,13 +3,10 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,38 +15,10 @@
 #include "formats/writer/package_writer.h"
 #include "ports/host/files.h"
 #include "ports/motion/clip.h"
+#include "ports/motion/npy_bytes.h"
 #include "ports/motion/rotation.h"
 
 namespace figurine::ports::tests {
-
-// One .npy, version 1.0. type: "<f8", "<f4", "<f2" (zeros and ones alone), ">f4", "<i8"; row-major.
-inline std::string npy_bytes(const std::string& type, const std::vector<size_t>& shape,
-                             const std::vector<double>& values) {
-  std::string tuple = "(";
-  for (size_t extent : shape) tuple += std::to_string(extent) + ",";
-  std::string header =
-      "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + tuple + "), }";
-  header.resize((header.size() + 1 + 10 + 63) / 64 * 64 - 10, ' ');
-  header.back() = '\n';
-  std::string out("\x93NUMPY\x01\x00", 8);
-  out += static_cast<char>(header.size() & 255);
-  out += static_cast<char>(header.size() >> 8);
-  out += header;
-  const auto append = [&](auto value) {
-    char bytes[sizeof value];
-    std::memcpy(bytes, &value, sizeof value);
-    if (type[0] == '>') std::reverse(std::begin(bytes), std::end(bytes));
-    out.append(bytes, sizeof value);
-  };
-  for (double value : values) {
-    const std::string kind = type.substr(1);
-    if (kind == "f8") append(value);
-    if (kind == "f4") append(static_cast<float>(value));
-    if (kind == "f2") append(static_cast<uint16_t>(value == 0 ? 0 : value < 0 ? 0xBC00 : 0x3C00));
-    if (kind == "i8") append(static_cast<int64_t>(value));
-  }
-  return out;
-}
 
 inline uint32_t crc32_of(const std::string& bytes) {
   uint32_t crc = ~0u;

@@ -3,47 +3,22 @@
 
 #include <zip.h>
 
-#include <cstring>
 #include <fstream>
 #include <map>
 #include <string>
-#include <vector>
 
 #include "gtest/gtest.h"
+#include "ports/motion/npy_bytes.h"
 #include "toolchain/error.h"
 #include "toolchain/temporary_folder.h"
 
 namespace figurine::body::test {
 
+using ports::tests::npy_bytes;
 using testing_tools::TemporaryFolder;
 
 inline void write_text(const std::string& path, const std::string& text) {
   std::ofstream(path, std::ios::binary) << text;
-}
-
-// One .npy, version 1.0. type: "<f8", "<f4", "<u4", "<i8"; values are row-major.
-inline std::string npy_bytes(const std::string& type, const std::vector<size_t>& shape,
-                             const std::vector<double>& values) {
-  std::string tuple = "(";
-  for (size_t extent : shape) tuple += std::to_string(extent) + ",";
-  std::string header =
-      "{'descr': '" + type + "', 'fortran_order': False, 'shape': " + tuple + "), }";
-  header.resize((header.size() + 1 + 10 + 63) / 64 * 64 - 10, ' ');
-  header.back() = '\n';
-  std::string out("\x93NUMPY\x01\x00", 8);
-  out += static_cast<char>(header.size() & 255);
-  out += static_cast<char>(header.size() >> 8);
-  out += header;
-  const auto append = [&](auto value) {
-    out.append(reinterpret_cast<const char*>(&value), sizeof value);
-  };
-  for (double value : values) {
-    if (type == "<f8") append(value);
-    if (type == "<f4") append(static_cast<float>(value));
-    if (type == "<u4") append(static_cast<uint32_t>(static_cast<int64_t>(value)));
-    if (type == "<i8") append(static_cast<int64_t>(value));
-  }
-  return out;
 }
 
 // name (without .npy) -> bytes of the .npy.
