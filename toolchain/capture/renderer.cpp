@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "figurine/check.h"
 #include "toolchain/body/surface.h"
@@ -22,6 +23,7 @@ constexpr float kOpaque = 0.985f;    // alpha from which nothing behind is looke
 constexpr float kInvisible = 0.02f;  // alpha below which a hit is passed over
 constexpr int kAmbientDirections = 64;
 constexpr float kAmbientReach_m = 1.5f;
+constexpr float kLeastCosine = 0.03f;  // of a direction to the normal, to be looked in
 constexpr float kFoldShade =
     2.5f;  // share of the sky that a fold as high as its wavelength would win or lose
 constexpr float kSurfaceGap_m = 0.0008f;  // ray origins are lifted by this
@@ -93,6 +95,7 @@ struct PosedMesh {
   const Mesh* mesh = nullptr;
   std::vector<float> position, normal, ambient;  // [V,3]
   std::vector<uint8_t> used;                     // [V] whether a triangle has it
+  std::vector<uint32_t> neighbours;              // those, near ones one after the other
   std::vector<float> texels_per_m;               // [F] of the colour texture
   std::vector<FoldSample> folds;  // of the mesh' fold pattern in this pose, world; empty: none
   std::array<float, 2> uv(uint32_t triangle, float b1, float b2) const {
@@ -137,6 +140,36 @@ void fade_shadow(const RTCFilterFunctionNArguments* a) {
                          RTCHitN_v(a->hit, a->N, i));
     if (left > 0.02f) a->valid[i] = 0;
   }
+}
+
+// The used vertices along a Z-order curve through the rest pose: a thousand cells a side.
+std::vector<uint32_t> along_a_curve(const Mesh& mesh, std::span<const uint8_t> used) {
+  constexpr uint32_t kBits = 10;
+  Vec3 low, high;
+  for (uint32_t v = 0; v < mesh.vertex_count(); ++v) {
+    const Vec3 p = load(&mesh.position_m[size_t{v} * 3]);
+    if (v == 0) low = high = p;
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const Vec3 size = high - low;
+  const float side = std::max({size.x, size.y, size.z, 1e-6f});
+  const auto cell = [&](float x) { return static_cast<uint32_t>(x / side * ((1u << kBits) - 1)); };
+  std::vector<std::pair<uint32_t, uint32_t>> order;  // place on the curve, vertex
+  for (uint32_t v = 0; v < mesh.vertex_count(); ++v) {
+    if (used[v] == 0) continue;
+    const Vec3 p = load(&mesh.position_m[size_t{v} * 3]) - low;
+    const uint32_t cells[3] = {cell(p.x), cell(p.y), cell(p.z)};
+    uint32_t place = 0;
+    for (uint32_t bit = kBits; bit-- > 0;) {
+      for (const uint32_t c : cells) place = place << 1 | (c >> bit & 1);
+    }
+    order.emplace_back(place, v);
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<uint32_t> out;
+  for (const auto& entry : order) out.push_back(entry.second);
+  return out;
 }
 
 // Texels a metre of every triangle, for choosing the texture's level. Measured in the rest pose:
@@ -194,6 +227,7 @@ struct Renderer::Scene {
 
   void build();
   void gather_ambient();
+  void gather_ambient(PosedMesh& posed, std::span<const uint32_t> vertices) const;
   struct Surface {
     SurfacePoint point;
     Vec3 shadow_origin;
@@ -219,6 +253,7 @@ Renderer::Renderer(const Person& person, FoldMode folds) : scene_(std::make_uniq
     posed.mesh = &mesh;
     posed.used.assign(mesh.vertex_count(), 0);
     for (uint32_t v : mesh.triangles) posed.used[v] = 1;
+    posed.neighbours = along_a_curve(mesh, posed.used);
     posed.texels_per_m = texel_density(mesh);
     scene_->meshes.push_back(std::move(posed));
   }
@@ -306,40 +341,49 @@ void trace_shadows(RTCScene scene, const Vec3* origin, const Vec3* direction, co
 
 }  // namespace
 
+// Rays of neighbours in one direction go through the same boxes, so a packet is eight vertices and
+// not eight directions of one.
 void Renderer::Scene::gather_ambient() {
   for (PosedMesh& posed : meshes) {
-    const size_t count = posed.position.size() / 3;
-    posed.ambient.assign(count * 3, 0);
-    for (size_t v = 0; v < count; ++v) {
-      if (posed.used[v] == 0) continue;
-      const Vec3 normal = load(&posed.normal[v * 3]);
-      const Vec3 origin = load(&posed.position[v * 3]) + normal * 0.002f;
-      Vec3 sum;
-      float weight_sum = 0;
-      Vec3 from[kLanes], to[kLanes];
-      float weight[kLanes], visible[kLanes];
-      int valid[kLanes] = {0}, filled = 0;
-      const auto flush = [&] {
-        for (int i = filled; i < kLanes; ++i) valid[i] = 0, from[i] = origin, to[i] = normal;
-        trace_shadows(scene, from, to, valid, kAmbientReach_m, false, visible);
-        for (int i = 0; i < filled; ++i) {
-          const float open = lighting.bounce + (1 - lighting.bounce) * visible[i];
-          sum += sky_radiance(lighting, to[i]) * (weight[i] * open);
-          weight_sum += weight[i];
-        }
-        filled = 0;
-      };
-      for (const Vec3& direction : directions) {
-        const float cosine = dot(direction, normal);
-        if (cosine < 0.03f) continue;
-        valid[filled] = -1, from[filled] = origin, to[filled] = direction, weight[filled] = cosine;
-        if (++filled == kLanes) flush();
-      }
-      if (filled != 0) flush();
-      if (weight_sum > 0) sum = sum * (1 / weight_sum);
-      posed.ambient[v * 3] = sum.x, posed.ambient[v * 3 + 1] = sum.y,
-                        posed.ambient[v * 3 + 2] = sum.z;
+    posed.ambient.assign(posed.position.size(), 0);
+    for (size_t first = 0; first < posed.neighbours.size(); first += kLanes) {
+      const size_t count = std::min<size_t>(kLanes, posed.neighbours.size() - first);
+      gather_ambient(posed, std::span(posed.neighbours).subspan(first, count));
     }
+  }
+}
+
+void Renderer::Scene::gather_ambient(PosedMesh& posed, std::span<const uint32_t> vertices) const {
+  Vec3 normal[kLanes], origin[kLanes], to[kLanes], sum[kLanes];
+  float weight[kLanes], weight_sum[kLanes] = {0}, visible[kLanes];
+  int valid[kLanes] = {0};
+  for (size_t i = 0; i < kLanes; ++i) {
+    const size_t v = vertices[std::min(i, vertices.size() - 1)];
+    normal[i] = load(&posed.normal[v * 3]);
+    origin[i] = load(&posed.position[v * 3]) + normal[i] * 0.002f;
+  }
+  for (const Vec3& direction : directions) {
+    bool any = false;
+    for (size_t i = 0; i < kLanes; ++i) {
+      to[i] = direction;
+      weight[i] = dot(direction, normal[i]);
+      valid[i] = i < vertices.size() && weight[i] >= kLeastCosine ? -1 : 0;
+      any = any || valid[i] != 0;
+    }
+    if (!any) continue;
+    trace_shadows(scene, origin, to, valid, kAmbientReach_m, true, visible);
+    const Vec3 sky = sky_radiance(lighting, direction);
+    for (size_t i = 0; i < vertices.size(); ++i) {
+      if (valid[i] == 0) continue;
+      const float open = lighting.bounce + (1 - lighting.bounce) * visible[i];
+      sum[i] += sky * (weight[i] * open);
+      weight_sum[i] += weight[i];
+    }
+  }
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    const Vec3 mean = weight_sum[i] > 0 ? sum[i] * (1 / weight_sum[i]) : sum[i];
+    float* const ambient = &posed.ambient[size_t{vertices[i]} * 3];
+    ambient[0] = mean.x, ambient[1] = mean.y, ambient[2] = mean.z;
   }
 }
 

@@ -2,6 +2,7 @@
 // geometry, no rays.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -69,7 +70,7 @@ inline Vec3 wrap_of(Surfacing surfacing) {
 inline float specular(const Gloss& gloss, Vec3 normal, Vec3 to_view, Vec3 to_light) {
   if (gloss.reflectance <= 0) return 0;
   const Vec3 half = normalized(to_view + to_light);
-  const float nh = std::fmax(dot(normal, half), 0.0f), lh = std::fmax(dot(to_light, half), 0.1f);
+  const float nh = std::max(dot(normal, half), 0.0f), lh = std::max(dot(to_light, half), 0.1f);
   const float a = gloss.roughness * gloss.roughness, a2 = a * a;
   const float d = nh * nh * (a2 - 1) + 1;
   return gloss.reflectance * a2 / (d * d * 4 * lh * lh * (gloss.roughness + 0.5f));
@@ -79,10 +80,10 @@ inline float specular(const Gloss& gloss, Vec3 normal, Vec3 to_view, Vec3 to_lig
 inline Vec3 shade(const Lighting& light, const SurfacePoint& p, float visible) {
   const float nl = dot(p.normal, light.key_direction);
   const Vec3 wrap = wrap_of(p.surfacing);
-  const auto lit = [&](float w) { return std::fmax(nl + w, 0.0f) / (1 + w); };
+  const auto lit = [&](float w) { return std::max(nl + w, 0.0f) / (1 + w); };
   const Vec3 key = light.key_colour * Vec3{lit(wrap.x), lit(wrap.y), lit(wrap.z)} * visible;
   const Vec3 fill =
-      light.fill_colour * std::fmax(0.5f + 0.5f * dot(p.normal, light.fill_direction), 0.0f);
+      light.fill_colour * std::max(0.5f + 0.5f * dot(p.normal, light.fill_direction), 0.0f);
   Vec3 out = p.albedo * (key + fill + p.ambient);
   if (nl > 0)
     out +=
