@@ -34,6 +34,12 @@ bool same_weights(const Network& a, const Network& b) {
   });
 }
 
+// Whatever a member without a network states, it is the shared network that learnt poses.
+const PoseStatistics& statistics_of(const NewMember& member, const NewPopulation& population) {
+  const bool own = population.shared == nullptr || member.avatar->has_network();
+  return (own ? *member.avatar : *population.shared).pose_statistics;
+}
+
 // Person and pose, whatever the network.
 Status check_person_alike(const NewMember& member, const NewPopulation& population) {
   const Avatar &own = *member.avatar, &first = *population.members.front().avatar;
@@ -42,7 +48,8 @@ Status check_person_alike(const NewMember& member, const NewPopulation& populati
     return mismatch(member, "has " + std::to_string(own.shape.size()) + " shape coefficients" +
                                 of_first + std::to_string(first.shape.size()));
   }
-  if (own.pose_statistics.joints != first.pose_statistics.joints) {
+  if (statistics_of(member, population).joints !=
+      statistics_of(population.members.front(), population).joints) {
     return mismatch(member,
                     "its pose statistics list other joints than those of '" + first.name + "'");
   }
@@ -303,7 +310,7 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
   to.name = from.name;
   to.network = from.initial;
   to.coding = from.coding;
-  to.pose_joints = first.pose_statistics.joints;
+  to.pose_joints = statistics_of(from.members.front(), from).joints;
   Storage storage;
   std::vector<Kernels> kernels;
   std::vector<Provenance> own;
@@ -316,9 +323,10 @@ Result<std::vector<std::byte>> write_population(const NewPopulation& from) {
     described.name = avatar.name;
     described.split = member.split;
     append(storage.shape, avatar.shape);
-    append(storage.pose_mean, avatar.pose_statistics.mean);
+    const PoseStatistics& poses = statistics_of(member, from);
+    append(storage.pose_mean, poses.mean);
     append(storage.golden_poses, avatar.golden.rotations);
-    add_factor(avatar.pose_statistics.covariance, 3 * to.pose_joints.size(), storage.pose_factor);
+    add_factor(poses.covariance, 3 * to.pose_joints.size(), storage.pose_factor);
     if (from.coding != DifferenceCoding::kNone) {
       for (const Layer& layer : avatar.network.layers) append(storage.bias, layer.bias);
     }

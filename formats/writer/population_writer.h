@@ -17,7 +17,7 @@ inline constexpr uint32_t kMostLevels = 127;  // of either sign, beside zero
 struct NewMember {
   const Avatar* avatar =
       nullptr;  // float weights; no picture and no hash of its golden frame is taken over. Of kNone
-                // it may lack a network, which is the shared one's
+                // it may lack a network, which is the shared one's with its pose statistics
   const Provenance* provenance = nullptr;  // quality included
   Split split = Split::kTrain;
 };

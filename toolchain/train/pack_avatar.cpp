@@ -274,7 +274,8 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   if (const SmallestExtentMap* extents = avatar.model().smallest_extents())
     content.smallest_extents = extents->view();
   content.antialiased = settings.antialiased;
-  content.pose_statistics = {features.joints, features.mean, features.covariance};
+  // What is learnt from poses is the network.
+  if (has_network) content.pose_statistics = {features.joints, features.mean, features.covariance};
   const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
                                 .macs_per_frame = macs,
                                 .gaussians = avatar.body().texel_count()};
