@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -12,6 +13,10 @@
 namespace figurine::samples {
 
 namespace {
+
+// Of the folder that a population grew in (docs/population.md).
+constexpr const char* kMembersFolder = "members";
+constexpr const char* kSharedNetwork = "initial/shared.fgn";
 
 // The .fgn files of a folder in the order of their names, so that the same folder always gives the
 // same answer. None if it cannot be read.
@@ -45,9 +50,10 @@ std::vector<std::string> siblings_of(const std::filesystem::path& folder) {
   return siblings;
 }
 
-// The package's own folder, then those of FIGURINE_PATH.
+// The package's own folder and, for a member, its population's; then those of FIGURINE_PATH.
 std::vector<std::string> first_body_folders(const std::filesystem::path& own) {
   std::vector<std::string> folders = {own.string()};
+  if (own.filename() == kMembersFolder) folders.push_back((own / "..").lexically_normal().string());
   if (const char* search = std::getenv("FIGURINE_PATH"); search != nullptr) {
     std::istringstream list(search);
     for (std::string part; std::getline(list, part, ':');) {
@@ -82,6 +88,21 @@ Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path, Pac
 
 namespace {
 
+Status no_such_member(const std::string& path, const std::string& member, size_t count,
+                      const std::string& list = "figurine-inspect lists them") {
+  return Status(StatusCode::kNotFound,
+                path + ": member '" + member + "': there is none of this name, and its " +
+                    std::to_string(count) + " members have the numbers 0 to " +
+                    std::to_string(count - 1) + " (" + list + ")");
+}
+
+Status names_no_member(const std::string& path, size_t count) {
+  return Status(StatusCode::kInvalidArgument, path + ": is a population: name one of its " +
+                                                  std::to_string(count) + " members, " + path +
+                                                  "#NAME or " + path + "#0 to #" +
+                                                  std::to_string(count - 1));
+}
+
 // "people.fgn#17" in its parts. A file of the whole name goes first: '#' is no unusual letter in a
 // path.
 std::pair<std::string, std::optional<std::string>> split_member(const std::string& name) {
@@ -94,23 +115,81 @@ std::pair<std::string, std::optional<std::string>> split_member(const std::strin
 
 Status open_population_member(const Population& population, const std::string& path,
                               const std::optional<std::string>& member, LoadedAvatar& out) {
-  const std::string count = std::to_string(population.size()),
-                    last = std::to_string(population.size() - 1);
-  if (!member) {
-    return Status(StatusCode::kInvalidArgument, path + ": is a population: name one of its " +
-                                                    count + " members, " + path + "#NAME or " +
-                                                    path + "#0 to #" + last);
-  }
+  if (!member) return names_no_member(path, population.size());
   const std::optional<size_t> index = find_member(population, *member);
-  if (!index) {
-    return Status(StatusCode::kNotFound, path + ": member '" + *member +
-                                             "': there is none of this name, and its " + count +
-                                             " members have the numbers 0 to " + last +
-                                             " (figurine-inspect lists them)");
-  }
+  if (!index) return no_such_member(path, *member, population.size());
   out.storage.resize(member_floats(population));
   out.avatar = open_member(population, *index, out.storage);
   return {};
+}
+
+// By its name, or if none is called so by its number, counted from 0.
+std::optional<std::string> find_member_file(const std::vector<std::string>& paths,
+                                            const std::string& member) {
+  for (const std::string& path : paths) {
+    if (std::filesystem::path(path).stem() == member) return path;
+  }
+  size_t number = 0;
+  const char* const end = member.data() + member.size();
+  const auto parsed = std::from_chars(member.data(), end, number);
+  if (parsed.ec != std::errc{} || parsed.ptr != end || number >= paths.size()) return std::nullopt;
+  return paths[number];
+}
+
+// A member that is a map alone gets the network that all members share, and what belongs to it.
+Status take_shared_network(const std::string& folder, const OpenOptions& options,
+                           LoadedAvatar& member) {
+  Result<std::unique_ptr<LoadedPackage>> shared = load_package(
+      (std::filesystem::path(folder) / kSharedNetwork).string(), PackageKind::kAvatar, options);
+  if (!shared.ok()) return shared.status();
+  const Avatar& from = (*shared)->package.avatar();
+  Avatar& to = member.avatar;
+  const auto differs = [&](const std::string& field) {
+    return Status(StatusCode::kMismatch, member.package->path + ": " + field + ": is not that of " +
+                                             (*shared)->path + ", whose network it lacks");
+  };
+  if (!from.has_network())
+    return Status(StatusCode::kInvalidArgument, (*shared)->path + ": has no network to share");
+  if (to.body_hash != from.body_hash) return differs("body");
+  if (to.texels_a_side() != from.texels_a_side()) return differs("uv_size");
+  if (to.template_mode != from.template_mode) return differs("template");
+  if (to.antialiased != from.antialiased) return differs("antialiased");
+  to.uv_size = to.texels_a_side();
+  to.kind() = from.kind();
+  to.map_statistics = from.map_statistics;
+  to.fixed_point = from.fixed_point;
+  to.pose_statistics = from.pose_statistics;
+  member.network = std::move(*shared);
+  return {};
+}
+
+Result<std::unique_ptr<LoadedAvatar>> load_from_folder(const std::string& name,
+                                                       const std::string& folder,
+                                                       const std::optional<std::string>& member,
+                                                       const OpenOptions& options) {
+  const std::vector<std::string> paths =
+      packages_in((std::filesystem::path(folder) / kMembersFolder).string());
+  if (paths.empty()) {
+    return Status(StatusCode::kNotFound, folder + ": is a folder, and no package is in its " +
+                                             std::string(kMembersFolder) + "/");
+  }
+  if (!member) return names_no_member(folder, paths.size());
+  const std::optional<std::string> path = find_member_file(paths, *member);
+  if (!path) return no_such_member(folder, *member, paths.size(), "its folder members/ holds them");
+  Result<std::unique_ptr<LoadedPackage>> package =
+      load_package(*path, PackageKind::kAvatar, options);
+  if (!package.ok()) return package.status();
+  auto loaded =
+      std::make_unique<LoadedAvatar>(LoadedAvatar{name, std::move(*package), {}, {}, {}, {}});
+  loaded->avatar = loaded->package->package.avatar();
+  if (!loaded->avatar.has_network())
+    FIG_RETURN_IF_ERROR(take_shared_network(folder, options, *loaded));
+  return loaded;
+}
+
+bool is_folder(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::is_directory(path, error);
 }
 
 }  // namespace
@@ -118,9 +197,11 @@ Status open_population_member(const Population& population, const std::string& p
 Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name,
                                                   const OpenOptions& options) {
   const auto [path, member] = split_member(name);
+  if (is_folder(path)) return load_from_folder(name, path, member, options);
   Result<std::unique_ptr<LoadedPackage>> package = load_package(path, options);
   if (!package.ok()) return package.status();
-  auto loaded = std::make_unique<LoadedAvatar>(LoadedAvatar{name, std::move(*package), {}, {}, {}});
+  auto loaded =
+      std::make_unique<LoadedAvatar>(LoadedAvatar{name, std::move(*package), {}, {}, {}, {}});
   const Package& opened = loaded->package->package;
   if (opened.kind() == PackageKind::kPopulation) {
     FIG_RETURN_IF_ERROR(open_population_member(opened.population(), path, member, *loaded));

@@ -32,13 +32,17 @@ Result<std::unique_ptr<LoadedPackage>> load_package(const std::string& path,
 struct LoadedAvatar {
   std::string name;                          // as it was asked for: "person.fgn", "people.fgn#17"
   std::unique_ptr<LoadedPackage> package;    // that it came from; null: it is no file
+  std::unique_ptr<LoadedPackage> network;    // that its network came from, if that is another
   std::vector<float> storage;                // of a member's weights
   std::shared_ptr<const void> made_of = {};  // of an avatar that is no file: what it borrows from
   Avatar avatar;                             // points into both
 };
 
 // "PATH" of an avatar, or "PATH#MEMBER" of a population, MEMBER a name or a number counted from 0.
-// One line says so if the package is of the other kind or has no such member.
+// A population is a package, or the folder that it grew in (docs/population.md): its members are
+// packages of their own, numbered in the order of their names, and have the network of
+// initial/shared.fgn where they come without one. One line says so if the package is of the other
+// kind, if there is no such member, or if member and network do not belong together.
 Result<std::unique_ptr<LoadedAvatar>> load_avatar(const std::string& name,
                                                   const OpenOptions& options = {});
 

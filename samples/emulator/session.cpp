@@ -351,7 +351,7 @@ uint64_t Session::memory_bytes() const {
     counted.push_back(package);
     bytes += package->file.bytes().size();
   };
-  for (const auto& avatar : avatars_) add(avatar->package.get());
+  for (const auto& avatar : avatars_) add(avatar->package.get()), add(avatar->network.get());
   for (const auto& body : bodies_) add(body.get());
   add(motion_.get());
   if (sampler_) add(sampler_->package.get());

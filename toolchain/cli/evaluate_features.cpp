@@ -12,6 +12,7 @@
 #include "toolchain/features/retrieval.h"
 #include "toolchain/model/threads.h"
 #include "toolchain/train/package_file.h"
+#include "toolchain/train/population_file.h"
 #include "toolchain/train/run_directory.h"
 
 namespace figurine::cli {
@@ -60,8 +61,7 @@ void run(const FeaturesArguments& arguments) {
   if (networks.features.empty() && networks.perceptual.empty()) {
     throw InputError("no network: give --features, --lpips or --inception");
   }
-  const train::PackageFile population =
-      train::open_package(arguments.population, PackageKind::kPopulation);
+  const train::PackageFile population = train::open_population(arguments.population);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   std::optional<train::PackageFile> motion;
   features::RetrievalOptions options = arguments.options;

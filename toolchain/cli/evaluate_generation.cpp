@@ -24,6 +24,7 @@
 #include "toolchain/members/member_sheets.h"
 #include "toolchain/model/threads.h"
 #include "toolchain/train/package_file.h"
+#include "toolchain/train/population_file.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/verify/device_samples.h"
 #include "toolchain/verify/float_sampler.h"
@@ -267,8 +268,7 @@ void run_generation(const GenerationArguments& arguments) {
   generation::GenerationOptions options = arguments.options;
   options.networks = features::open_networks(arguments.networks),
   options.threads = arguments.threads;
-  const train::PackageFile population =
-      train::open_package(arguments.population, PackageKind::kPopulation);
+  const train::PackageFile population = train::open_population(arguments.population);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   const nlohmann::json networks = features::describe_networks(options.networks, population.package);
   std::optional<generation::CapturedPeople> people;

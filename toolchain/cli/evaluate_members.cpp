@@ -17,6 +17,7 @@
 #include "toolchain/members/members.h"
 #include "toolchain/model/threads.h"
 #include "toolchain/train/package_file.h"
+#include "toolchain/train/population_file.h"
 #include "toolchain/train/run_directory.h"
 
 namespace figurine::cli {
@@ -115,8 +116,7 @@ void run_members(const MembersArguments& arguments) {
   check_name("--wall", arguments.wall);
   check_name("--interpolation", arguments.interpolation);
   check_name("--worst-sheet", arguments.worst_sheet);
-  const train::PackageFile population =
-      train::open_package(arguments.population, PackageKind::kPopulation);
+  const train::PackageFile population = train::open_population(arguments.population);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
   std::optional<train::PackageFile> motion;
   if (!arguments.motion.empty()) {

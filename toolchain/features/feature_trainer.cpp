@@ -24,6 +24,7 @@
 #include "toolchain/train/flat_tensor.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/package_file.h"
+#include "toolchain/train/population_file.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/train/run_directory.h"
 #include "toolchain/train/tensor_file.h"
@@ -428,8 +429,7 @@ FeatureResult train_features(const FeatureRequest& request) {
       throw InputError(checkpoint + ": no training to resume");
     return finished(request.output);
   }
-  const train::PackageFile population =
-      train::open_package(request.population, PackageKind::kPopulation);
+  const train::PackageFile population = train::open_population(request.population);
   const train::PackageFile body = train::open_package(request.body, PackageKind::kBody);
   std::optional<train::PackageFile> motion;
   if (!request.motion.empty()) {

@@ -19,6 +19,7 @@
 #include "toolchain/random/counter.h"
 #include "toolchain/random/shuffled_order.h"
 #include "toolchain/tensor_operations.h"
+#include "toolchain/train/population_file.h"
 #include "toolchain/train/run_directory.h"
 
 namespace figurine::generate {
@@ -401,8 +402,7 @@ ModelSpace make_space(const Members& members, const std::vector<measure::Token>&
 SamplerResult train_sampler(const SamplerRequest& request) {
   const train::RunDirectory run{request.run};
   ProcessGroup group(request.place, request.rank_timeout_s);
-  const train::PackageFile population =
-      train::open_package(request.population, PackageKind::kPopulation);
+  const train::PackageFile population = train::open_population(request.population);
   std::optional<ports::FolderLock> lock;  // of two trainings in one folder the slower one would win
   const auto lock_run = [&] {
     lock.emplace(value_or_throw(ports::FolderLock::acquire(request.run), "cannot train"));
@@ -483,8 +483,7 @@ TrainedSampler TrainedSampler::open(const std::string& path, const std::string& 
   sampler.settings = sampler_settings_from_json(description.at("settings"), run.run_json());
   const std::string where =
       population.empty() ? description.at("population").value("path", "") : population;
-  sampler.population =
-      std::make_unique<train::PackageFile>(train::open_package(where, PackageKind::kPopulation));
+  sampler.population = std::make_unique<train::PackageFile>(train::open_population(where));
   check_population(description, *sampler.population, run, where);
   const Population& people = sampler.population->package.population();
   sampler.layout = std::make_unique<measure::WeightLayout>(

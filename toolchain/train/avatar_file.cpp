@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "toolchain/error.h"
+#include "toolchain/train/population_file.h"
 
 namespace figurine::train {
 
@@ -14,7 +15,7 @@ AvatarFile open_avatar(const std::string& name) {
     opened.avatar = opened.file.package.avatar();
     return opened;
   }
-  AvatarFile opened{open_package(name.substr(0, hash), PackageKind::kPopulation), {}, {}};
+  AvatarFile opened{open_population(name.substr(0, hash)), {}, {}};
   const Population& population = opened.file.package.population();
   const std::optional<size_t> member = find_member(population, name.substr(hash + 1));
   if (!member)

@@ -166,13 +166,16 @@ std::vector<std::byte> pack_population(const PackPopulationOptions& options) {
     }
     population.budget = largest(population.budget, package.budget());
   }
-  population.settings = {
-      {"population.command", current_command()},
-      {"population.commit", current_commit()},
-      {"population.levels", std::to_string(options.levels)},
-      {"population.init", !options.shared.empty() ? options.shared
-                          : options.init.empty()  ? "seed " + std::to_string(kInitialWeightsSeed)
-                                                  : options.init}};
+  population.settings = {{"population.levels", std::to_string(options.levels)}};
+  if (options.say_how) {
+    population.settings.insert(
+        population.settings.begin(),
+        {{"population.command", current_command()}, {"population.commit", current_commit()}});
+    population.settings.push_back(
+        {"population.init", !options.shared.empty() ? options.shared
+                            : options.init.empty()  ? "seed " + std::to_string(kInitialWeightsSeed)
+                                                    : options.init});
+  }
   population.progress = [&](size_t done) {
     progress.show(0.5 + 0.5 * static_cast<double>(done) / static_cast<double>(sources.size()),
                   std::to_string(done) + " members");

@@ -28,6 +28,8 @@ struct PackPopulationOptions {
   DifferenceCoding coding = DifferenceCoding::kInt8;
   uint32_t levels = kMostLevels;  // of int8 (population_writer.h)
   uint32_t threads = 1;
+  bool say_how = true;  // command, commit and where things lay; without, the same members make the
+                        // same bytes wherever they lie
   bool quiet = false;
 };
 

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "ports/host/files.h"
 #include "toolchain/error.h"
 
 namespace figurine::train {
@@ -14,7 +15,8 @@ PackageFile open_package(const std::string& path, PackageKind kind) {
   if (package->kind() != kind)
     throw InputError(path + ": is a package of kind " + to_string(package->kind()) + ", not " +
                      to_string(kind));
-  return {path, std::move(bytes).value(), std::move(package).value()};
+  return {path, std::make_shared<ports::MappedFile>(std::move(bytes).value()),
+          std::move(package).value()};
 }
 
 }  // namespace figurine::train

@@ -1,16 +1,16 @@
-// A package on disk: its memory map and the opened view, kept together.
+// A package on disk: its bytes and the opened view, kept together.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "figurine/package.h"
-#include "ports/host/files.h"
 
 namespace figurine::train {
 
 struct PackageFile {
   std::string path;
-  ports::MappedFile bytes;
+  std::shared_ptr<const void> bytes;  // what the package points into
   Package package;
 };
 

@@ -18,6 +18,7 @@
 #include "toolchain/population/build.h"
 #include "toolchain/population/state.h"
 #include "toolchain/train/package_file.h"
+#include "toolchain/train/population_file.h"
 #include "toolchain/train/run_directory.h"
 
 namespace figurine::population {
@@ -136,6 +137,21 @@ TEST(BuildPopulation, OfOneNetworkHoldsItOnceAndAMapForEach) {
   EXPECT_GT(row.at("quality").at("held_out_views").at("psnr_db").get<double>(), 10);
   EXPECT_LT(std::abs(row.at("rounding").at("views").at("loss_db").get<double>()), 1);
   EXPECT_EQ(entries(state.initial()), 2u) << "weights and avatar; captures and run are gone";
+
+  // The folder is read as its package is, and wherever it lies the same bytes come of it.
+  const train::PackageFile from_folder = train::open_population(state.folder);
+  const Population& same = from_folder.package.population();
+  ASSERT_EQ(same.size(), 4u);
+  EXPECT_EQ(same.members[3].split, Split::kTest);
+  EXPECT_TRUE(std::ranges::equal(same.static_code, population.static_code));
+  EXPECT_EQ(same.members[3].quality, population.members[3].quality);
+  fs::create_directories(place.folder.path("elsewhere"));
+  fs::copy(state.folder, place.folder.path("elsewhere/state"), fs::copy_options::recursive);
+  EXPECT_EQ(train::open_population(place.folder.path("elsewhere/state/")).package.content_hash(),
+            from_folder.package.content_hash());
+  fs::remove(state.member("000001"));
+  EXPECT_EQ(train::open_population(state.folder).package.population().size(), 3u)
+      << "a part of it is one too";
 
   const Workplace again(testing_tools::small_shared_recipe());
   BuildOptions one_slot = again.options("state");
