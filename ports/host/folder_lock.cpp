@@ -17,6 +17,14 @@ constexpr uint64_t kPoll_ns = 50'000'000;
 }  // namespace
 
 Result<FolderLock> FolderLock::acquire(const std::string& folder, double patience_s) {
+  return lock(folder, LOCK_EX, patience_s);
+}
+
+Result<FolderLock> FolderLock::share(const std::string& folder, double patience_s) {
+  return lock(folder, LOCK_SH, patience_s);
+}
+
+Result<FolderLock> FolderLock::lock(const std::string& folder, int how, double patience_s) {
   // Not inherited by programs that are started: the lock would outlive its process in them.
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0)
@@ -24,7 +32,7 @@ Result<FolderLock> FolderLock::acquire(const std::string& folder, double patienc
                   folder + ": cannot be opened: " + std::generic_category().message(errno));
   FolderLock lock(fd);
   const uint64_t start = now_ns(), patience_ns = static_cast<uint64_t>(1e9 * patience_s);
-  while (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+  while (::flock(fd, how | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     if (now_ns() - start < patience_ns) {
       sleep_until(now_ns() + kPoll_ns);
       continue;

@@ -183,6 +183,7 @@ void make_members(const BuildOptions& options, const Workshop& workshop,
            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() >
                options.stop_after_s;
   };
+  const bool whole = options.parts == 1;
   std::vector<size_t> missing;
   size_t done = 0, failed = 0, since_packed = 0;
   for (size_t i = 0; i < table.size(); ++i) {
@@ -194,7 +195,7 @@ void make_members(const BuildOptions& options, const Workshop& workshop,
       missing.push_back(i);
     }
   }
-  save_table(workshop.state, table);
+  if (whole) save_table(workshop.state, table);
   const auto job = [&](size_t m) {
     if (late()) throw train::Interrupted("not begun: the time given is over");
     return make_member(workshop, table[missing[m]].identity).dump();
@@ -210,7 +211,7 @@ void make_members(const BuildOptions& options, const Workshop& workshop,
                    row.reason.c_str());
     }
     try {
-      save_table(workshop.state, table);
+      if (whole) save_table(workshop.state, table);
     } catch (const InputError&) {
       // The disk is full just now. Others may still finish and leave room; the last writing below
       // says so if not.
@@ -224,7 +225,7 @@ void make_members(const BuildOptions& options, const Workshop& workshop,
   // In pieces, so that the package can be written between: it needs LibTorch, so a process, so a
   // moment without others' results.
   const size_t piece =
-      options.pack_period > 0 ? options.pack_period : std::max<size_t>(1, missing.size());
+      whole && options.pack_period > 0 ? options.pack_period : std::max<size_t>(1, missing.size());
   for (size_t first = 0; first < missing.size() && !late(); first += piece) {
     const size_t count = std::min(piece, missing.size() - first);
     train::run_in_slots(
@@ -236,7 +237,43 @@ void make_members(const BuildOptions& options, const Workshop& workshop,
       since_packed = 0;
     }
   }
-  save_table(workshop.state, table);
+  if (whole) save_table(workshop.state, table);
+}
+
+bool is_shared_ready(const Recipe& recipe, const State& state) {
+  const bool wanted = recipe.initial.rounds > 0 || recipe.shared.identities > 0;
+  return fs::exists(state.body()) && fs::exists(state.split()) &&
+         (!wanted || fs::exists(state.initial_weights()));
+}
+
+// Members of a build that was killed may still be at work: they hold the folder and are ending.
+// Parts hold it together, each its own folder below for itself.
+std::vector<ports::FolderLock> lock_folders(const BuildOptions& options, const State& state) {
+  std::vector<ports::FolderLock> locks;
+  const auto take = [&](Result<ports::FolderLock> lock) {
+    locks.push_back(value_or_throw(std::move(lock), "cannot build"));
+  };
+  if (options.parts == 1) {
+    take(ports::FolderLock::acquire(state.folder, kPatience_s));
+    fs::remove_all(state.parts());
+  } else {
+    take(ports::FolderLock::share(state.folder, kPatience_s));
+    const std::string own = state.part(options.part, options.parts);
+    train::make_folder(own);
+    take(ports::FolderLock::acquire(own, kPatience_s));
+  }
+  return locks;
+}
+
+// The members of a part, all identities' without one.
+std::vector<TableRow> rows_of(const Recipe& recipe, const BuildOptions& options) {
+  std::vector<TableRow> table;
+  uint32_t number = 0;
+  for (const Identity& identity : identities_of(recipe)) {
+    if (number++ % options.parts == options.part)
+      table.push_back({.identity = identity, .reason = {}, .row = {}});
+  }
+  return table;
 }
 
 }  // namespace
@@ -244,12 +281,16 @@ void make_members(const BuildOptions& options, const Workshop& workshop,
 void build(const BuildOptions& options) {
   Recipe recipe = read_recipe(options.recipe);
   const State state{options.state};
+  const bool whole = options.parts == 1;
   train::make_folder(state.members());
-  // Members of a build that was killed may still be at work: they hold the folder and are ending.
-  const ports::FolderLock lock =
-      value_or_throw(ports::FolderLock::acquire(state.folder, kPatience_s), "cannot build");
+  const std::vector<ports::FolderLock> locks = lock_folders(options, state);
+  if (!whole && !is_shared_ready(recipe, state)) {
+    throw InputError(state.folder +
+                     ": what all members share is not there yet: population "
+                     "--initial-weights-only makes it, before any part");
+  }
   keep_recipe(options, state);
-  train::write_json(state.split(), split_of(recipe));
+  if (whole) train::write_json(state.split(), split_of(recipe));
   make_body(recipe, options, state);
   const train::PackageFile body = train::open_package(state.body(), PackageKind::kBody);
   const Motions motions = read_motions(recipe, options.recipe, body.package.body());
@@ -286,22 +327,26 @@ void build(const BuildOptions& options) {
   recipe.training.freeze_network = alike;
   if (options.initial_weights_only) return;
 
-  std::vector<TableRow> table;
-  for (const Identity& identity : identities_of(recipe))
-    table.push_back({.identity = identity, .reason = {}, .row = {}});
+  std::vector<TableRow> table = rows_of(recipe, options);
   make_members(options, workshop, table, progress);
-  if (const std::string failure = pack_apart(recipe, state); !failure.empty())
-    throw InputError(failure);
   size_t finished = 0, failed = 0;
   for (const TableRow& row : table)
     finished += row.status == "finished", failed += row.status == "failed";
-  if (!options.quiet) {
+  if (whole) {
+    if (const std::string failure = pack_apart(recipe, state); !failure.empty())
+      throw InputError(failure);
+  } else if (!options.quiet) {
+    std::printf("%s: %zu of %zu members of part %u of %u\n", options.state.c_str(), finished,
+                table.size(), options.part, options.parts);
+  }
+  if (whole && !options.quiet) {
     std::printf("%s: %zu of %zu members, package %s, table %s\n", options.state.c_str(), finished,
                 table.size(), state.package().c_str(), state.table().c_str());
   }
   if (failed > 0)
     throw InputError(options.state + ": " + std::to_string(failed) + " of " +
-                     std::to_string(table.size()) + " members failed, see " + state.table());
+                     std::to_string(table.size()) + " members failed" +
+                     (whole ? ", see " + state.table() : ""));
 }
 
 }  // namespace figurine::population

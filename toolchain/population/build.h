@@ -15,6 +15,9 @@ struct BuildOptions {
   unsigned slots = 1;         // processes of one thread
   uint32_t pack_period = 30;  // members between two writings of the package; 0: at the end alone
   double stop_after_s = 0;    // starts no further member then; what runs is finished. 0: never
+  // Of many processes on a folder that all of them see: this one makes every parts-th member,
+  // beginning with `part`, and neither table nor package. What all members share must be there.
+  uint32_t part = 0, parts = 1;
   bool initial_weights_only = false;
   bool quiet = false;
 };

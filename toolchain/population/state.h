@@ -11,12 +11,14 @@
 //   members/ID.fgn, ID.json    the avatar (float weights, no picture) and what it was measured to
 //                              be; ID.jpg: held-out pictures beside the
 //                              truth
+//   parts/K-of-N               while one of several processes makes its part; empty
 //   members.csv                a table of all, written whenever one ends
 //   population.fgn             the package; written now and then, and at the end
 //
 // All files appear whole or not at all, so the folder can be left and gone on with at any time.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 namespace figurine::population {
@@ -46,6 +48,10 @@ struct State {
   }
   std::string sheet(const std::string& identity) const {
     return members() + "/" + identity + ".jpg";
+  }
+  std::string parts() const { return folder + "/parts"; }
+  std::string part(uint32_t part, uint32_t parts) const {
+    return this->parts() + "/" + std::to_string(part) + "-of-" + std::to_string(parts);
   }
   std::string table() const { return folder + "/members.csv"; }
   std::string package() const { return folder + "/population.fgn"; }

@@ -129,6 +129,14 @@ TEST_F(Files, OneLockHoldsAFolder) {
     EXPECT_EQ(entries(), 0u) << "it leaves no file";
   }
   EXPECT_TRUE(FolderLock::acquire(folder_).ok());
+  {
+    const Result<FolderLock> one = FolderLock::share(folder_), other = FolderLock::share(folder_);
+    EXPECT_TRUE(one.ok() && other.ok());
+    EXPECT_FALSE(FolderLock::acquire(folder_).ok()) << "two share it";
+  }
+  const Result<FolderLock> alone = FolderLock::acquire(folder_);
+  ASSERT_TRUE(alone.ok());
+  EXPECT_FALSE(FolderLock::share(folder_).ok()) << "one has it for himself";
   EXPECT_NE(
       FolderLock::acquire(path("nowhere")).status().message().find("nowhere: cannot be opened"),
       std::string::npos);
