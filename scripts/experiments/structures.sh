@@ -1,53 +1,49 @@
 #!/usr/bin/env bash
 # What a population's members should be made of: one network that LEARNERS people share, and what
-# somebody new changes of it. PEOPLE new people are trained in each of these ways, all from the
-# shared network and the learners' mean static map, but for the first:
+# somebody new changes of it. Everybody is trained in each of these ways, all from the shared network
+# and the learners' mean static map, but for the first:
 #
-#   scratch      everything, from the common random weights
+#   scratch      everything, from the common random weights (edge alone)
 #   free         everything
 #   map          the static map alone
-#   residual_R   and the network's kernels by A B
+#   residual_R   and the network's kernels by A B (edge alone)
 #   scale_R      and the network's kernels by products with 1 + A B, half of A drawn once for all
 #   basis_R      and the network's kernels by A S, whose S is everybody's
 #
-# Writes docs/results/structures.json.
+# At `edge` PEOPLE new people say what each way costs in pictures. At `nano` the learners are trained
+# in each way too, so that a way is a population: how much of the new people the learners span, how
+# many bytes it has, and what a small sampler makes of it.
 #
-#   scripts/experiments/structures.sh [FOLDER]
+# Writes its scale's part of docs/results/structures.json.
+#
+#   scripts/experiments/structures.sh edge|nano [FOLDER]
 #
 # FOLDER (default out/structures) keeps every step: run it again and it goes on where it stopped.
 #
-# Environment: LEARNERS (12), PEOPLE (6), ITERATIONS (1000) of a new person. On two quiet cores
-# forty minutes.
+# Environment: LEARNERS (12 at edge, 60 at nano), PEOPLE (6, 15), ITERATIONS of a person (1000, 600),
+# SAMPLER_ITERATIONS (1500). On two quiet cores forty minutes each.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
 
-folder=${1:-out/structures} learners=${LEARNERS:-12} people=${PEOPLE:-6}
-iterations=${ITERATIONS:-1000}
+scale=${1:?edge or nano}
+folder=${2:-out/structures}/$scale
+case $scale in
+  edge)
+    learners=${LEARNERS:-12} people=${PEOPLE:-6} iterations=${ITERATIONS:-1000}
+    pictures=(--frames 50 --views 6 --bust-views 3 --size 512x512)
+    preset=(--preset edge) uv=128
+    ;;
+  nano)
+    learners=${LEARNERS:-60} people=${PEOPLE:-15} iterations=${ITERATIONS:-600}
+    pictures=(--frames 30 --views 6 --bust-views 2 --size 128x128)
+    preset=(--preset nano --static-grids all:T --network-size 16) uv=32
+    ;;
+  *) die "structures: '$scale': edge or nano" ;;
+esac
 programs=()
 . scripts/experiments/people.sh
 
-capture_people() {  # NAME COUNT SEED
-  [ -e "$folder/$1/.done" ] || {
-    step "captures of $2 $1"
-    train capture --body "$body" --identities "$2" --seed "$3" --frames 50 --views 6 \
-      --bust-views 3 --size 512x512 "${motions[@]}" --resume -o "$folder/$1"
-    touch "$folder/$1/.done"
-  }
-}
-capture_people learners "$learners" 2026
-capture_people people "$people" 2027
-
-finished() { [ -e "$1/run.json" ] && grep -q '"status": "finished"' "$1/run.json"; }
-learn() {  # RUN OPTIONS...: trains what is not there yet
-  local run=$1 fresh=("${@:2}")
-  finished "$run" && return
-  if [ -e "$run/run.json" ]; then
-    train avatar --resume --quiet -o "$run"
-  else
-    train avatar --body "$body" --quiet -o "$run" "${fresh[@]}"
-  fi
-}
 # Two at a time, one core each.
 beside() {
   while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n; done
@@ -55,18 +51,54 @@ beside() {
 }
 all() { while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done; }
 
+capture_people() {  # NAME COUNT SEED
+  [ -e "$folder/$1/.done" ] || {
+    step "captures of $2 $1"
+    train capture --body "$body" --identities "$2" --seed "$3" "${pictures[@]}" "${motions[@]}" \
+      --resume -o "$folder/$1"
+    touch "$folder/$1/.done"
+  }
+}
+capture_people learners "$learners" 2026
+capture_people people "$people" 2027
+
+names() { seq -f %06.0f 0 $(($1 - 1)); }
+finished() { [ -e "$1/run.json" ] && grep -q '"status": "finished"' "$1/run.json"; }
+learn() {  # RUN OPTIONS...: trains what is not there yet
+  local run=$1 fresh=("${@:2}")
+  finished "$run" && return
+  if [ -e "$run/run.json" ]; then
+    train avatar --resume --quiet -o "$run"
+  else
+    train avatar --body "$body" --quiet -o "$run" "${preset[@]}" "${fresh[@]}"
+  fi
+}
+
 shared=$folder/shared
 everybody=()
-for k in $(seq 0 $((learners - 1))); do
-  everybody+=(--data "$folder/learners/$(printf %06d "$k")")
-done
+for name in $(names "$learners"); do everybody+=(--data "$folder/learners/$name"); done
 step "the shared network"
 learn "$shared" "${everybody[@]}" --iterations $((learners * iterations)) --poses 2
 
+# WAY GROUP PERSON OPTIONS...: one person's run, measured.
+one() {
+  local run=$folder/runs/$1/$2_$3
+  learn "$run" --data "$folder/$2/$3" --iterations "$iterations" --views-per-pose 2 --threads 1 \
+    --init "$shared" "${@:4}"
+  [ "$run/evaluation.json" -nt "$run/weights.safetensors" ] ||
+    train evaluate reconstruction --run "$run" --threads 1 > /dev/null
+}
+way() {  # WAY OPTIONS...
+  local name
+  step "$1"
+  for name in $(names "$people"); do beside one "$1" people "$name" "${@:2}"; done
+  [ "$scale" = edge ] ||
+    for name in $(names "$learners"); do beside one "$1" learners "$name" "${@:2}"; done
+}
+
 step "the directions that learners change it by"
 runs=()
-for k in $(seq 0 $((learners - 1))); do
-  name=$(printf %06d "$k")
+for name in $(names "$learners"); do
   runs+=("$folder/tuned/$name")
   beside learn "$folder/tuned/$name" --data "$folder/learners/$name" \
     --init "$shared/$name" --iterations $((iterations / 3)) --views-per-pose 2 --threads 1
@@ -75,31 +107,69 @@ all
 basis=$folder/basis.safetensors
 [ -e "$basis" ] || train basis --shared "$shared" "${runs[@]}" --rank 32 -o "$basis"
 
-ways="
-scratch
-free|--init $shared
-map|--init $shared --freeze-network
-residual_4|--init $shared --network-rank 4
-scale_4|--init $shared --network-rank 4 --network-adapter scale
-basis_8|--init $shared --network-rank 8 --network-adapter basis --network-basis $basis
-basis_32|--init $shared --network-rank 32 --network-adapter basis --network-basis $basis
-"
-one() {  # NAME PERSON OPTIONS...
-  local run=$folder/runs/$1/$2
-  learn "$run" --data "$folder/people/$2" --iterations "$iterations" --views-per-pose 2 \
-    --threads 1 "${@:3}"
-  [ "$run/evaluation.json" -nt "$run/weights.safetensors" ] ||
-    train evaluate reconstruction --run "$run" --threads 1 > /dev/null
-}
-while IFS='|' read -r name options; do
-  [ -n "$name" ] || continue
-  step "$name"
-  for k in $(seq 0 $((people - 1))); do
-    # shellcheck disable=SC2086  # options are words
-    beside one "$name" "$(printf %06d "$k")" $options
+on_basis=(--network-adapter basis --network-basis "$basis")
+if [ "$scale" = edge ]; then
+  step "scratch"
+  for name in $(names "$people"); do
+    run=$folder/runs/scratch/people_$name
+    beside learn "$run" --data "$folder/people/$name" --iterations "$iterations" \
+      --views-per-pose 2 --threads 1
   done
-done <<< "$ways"
+  all
+  for name in $(names "$people"); do
+    run=$folder/runs/scratch/people_$name
+    [ "$run/evaluation.json" -nt "$run/weights.safetensors" ] ||
+      train evaluate reconstruction --run "$run" > /dev/null
+  done
+  way residual_4 --network-rank 4
+  way basis_32 --network-rank 32 "${on_basis[@]}"
+fi
+way free
+way map --freeze-network
+way scale_4 --network-rank 4 --network-adapter scale
+way basis_8 --network-rank 8 "${on_basis[@]}"
 all
+
+if [ "$scale" = nano ]; then
+  split=$folder/split.json
+  list() { names "$2" | sed "s/.*/\"$1_&\"/" | paste -sd,; }
+  printf '{"train": [%s], "validation": [], "test": [%s]}\n' "$(list learners "$learners")" \
+    "$(list people "$people")" > "$split"
+  [ -e "$folder/shared.fgn" ] ||
+    train pack "$shared/000000" --body "$body" -o "$folder/shared.fgn" > /dev/null
+  pack_one() {  # RUN PACKAGE OPTIONS...
+    [ -e "$2" ] || train pack "$1" --name "$(basename "$1")" --threads 1 "${@:3}" -o "$2" > /dev/null
+  }
+  for ways in free map scale_4 basis_8; do
+    step "$ways: a population"
+    members=$folder/members/$ways
+    mkdir -p "$members"
+    own=() together=(--init "$shared")
+    [ $ways != map ] || own=(--no-network) together=(--shared "$folder/shared.fgn")
+    for run in "$folder/runs/$ways"/*; do
+      beside pack_one "$run" "$members/$(basename "$run").fgn" "${own[@]}"
+    done
+    all
+    population=$folder/$ways.fgn
+    [ -e "$population" ] ||
+      train pack --population "$members" "${together[@]}" --split "$split" --name "$ways" \
+        -o "$population"
+    [ -e "$folder/$ways.json" ] ||
+      train evaluate members "$population" --body "$body" --wall "$folder/$ways.jpg" \
+        -o "$folder/$ways.json" > /dev/null
+    learn_sampler() {
+      finished "$folder/samplers/$ways" ||
+        train sampler --population "$population" --body "$body" --variant basis --rank 32 \
+          --size small --iterations "${SAMPLER_ITERATIONS:-1500}" --learning-rate 5e-4 --threads 2 \
+          -o "$folder/samplers/$ways"
+    }
+    learn_sampler
+    [ -e "$folder/generation_$ways.json" ] ||
+      train evaluate generation --population "$population" --body "$body" --no-baselines \
+        --run "basis=$folder/samplers/$ways" --replicates 100 \
+        --sheet "$folder/generation_$ways.jpg" -o "$folder/generation_$ways.json" > /dev/null
+  done
+fi
 step "docs/results/structures.json"
 scripts/run python3 scripts/experiments/structures_report.py "$folder" \
-  docs/results/structures.json "scripts/experiments/structures.sh"
+  docs/results/structures.json "scripts/experiments/structures.sh $scale"
