@@ -61,6 +61,7 @@ Status FixedPointStorage::quantise(const Network& network, std::span<const Quant
   if (values.size() != network.layers.size())
     return Status(StatusCode::kInvalidArgument, "fixed point: not one scale per layer");
   std::vector<std::vector<float>> scales(network.layers.size());
+  for (size_t i = 0; i < scales.size(); ++i) scales[i].reserve(network.layers[i].bias.size());
   for_each_output(network, values, [&](size_t layer, size_t, const OutputWeights& output) {
     scales[layer].push_back(raise_weight_scale(max_abs_scale(output.weights), output));
   });
@@ -77,6 +78,10 @@ Status FixedPointStorage::quantise(const Network& network, std::span<const Quant
   weight_scale_ = std::move(weight_scale);
   weights_.assign(network.layers.size(), {});
   bias_.assign(network.layers.size(), {});
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    weights_[i].reserve(network.layers[i].weights.size());
+    bias_[i].reserve(network.layers[i].bias.size());
+  }
   for_each_output(network, values, [&](size_t layer, size_t o, const OutputWeights& output) {
     const float scale = weight_scale_[layer][o];
     for (const float weight : output.weights)

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "figurine/avatar.h"
+#include "figurine/detail/memory_reserve.h"
 #include "figurine/texel_grid.h"
 
 namespace figurine {
@@ -79,6 +80,8 @@ Status validate_static_part(const StaticPart& part, const Body& body) {
   FIG_RETURN_IF_ERROR(validate_static_part(part, body.uv_size));
   for (size_t g = 0; g < part.groups.size(); ++g) {
     const StaticGroup& group = part.groups[g];
+    const MemoryReserve reserve(size_t{group.grid_size} * group.grid_size / 8);
+    if (!reserve.held()) return no_memory();
     const size_t cells = group.values.size() / group.channels,
                  needed = covered_cells(body, group.grid_size);
     if (cells == needed) continue;

@@ -8,7 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/src/base/content_bytes.h"
 #include "runtime/src/base/float_mode.h"
+#include "runtime/src/base/memory.h"
 #include "runtime/src/base/stage_clock.h"
 #include "runtime/src/kernels/table.h"
 #include "runtime/src/pose/avatar_identity.h"
@@ -223,6 +225,8 @@ Renderer::Renderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Renderer::~Renderer() = default;
 
 Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& options) {
+  const MemoryReserve reserve;
+  if (!reserve.held()) return no_memory();
   const Result<const KernelTable*> kernels =
       kernels_for(options.isa.value_or(supported_isas().back()));
   if (!kernels.ok()) return kernels.status();
@@ -242,6 +246,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const RendererOptions& option
 
 Result<AvatarId> Renderer::add_avatar(const Package& avatar, const Package& body,
                                       std::optional<Precision> precision) {
+  const MemoryReserve reserve;
+  if (!reserve.held()) return no_memory();
   if (avatar.kind() != PackageKind::kAvatar)
     return Status(StatusCode::kMismatch,
                   std::string("an avatar is wanted, not a ") + to_string(avatar.kind()));
@@ -251,6 +257,9 @@ Result<AvatarId> Renderer::add_avatar(const Package& avatar, const Package& body
 Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
                                       std::optional<Precision> precision) {
   const FloatModeScope mode(FloatMode::frame());
+  const MemoryReserve reserve(content_bytes(avatar) +
+                              2 * sizeof(Impl::AddedAvatar) * (impl_->avatars.size() + 1));
+  if (!reserve.held()) return no_memory();
   if (body.kind() != PackageKind::kBody)
     return Status(StatusCode::kMismatch,
                   std::string("a body is wanted, not a ") + to_string(body.kind()));
@@ -283,6 +292,7 @@ Result<AvatarId> Renderer::add_avatar(const Avatar& avatar, const Package& body,
 }
 
 Status Renderer::remove_avatar(AvatarId avatar) {
+  const MemoryReserve messages;  // without one as well: removing frees
   const auto added = impl_->find(avatar);
   if (added == impl_->avatars.end()) return invalid("there is no avatar of this id");
   impl_->avatars.erase(added);
@@ -298,6 +308,8 @@ Precision Renderer::precision(AvatarId avatar) const {
 
 Status Renderer::render(const Frame& frame, const ImageTarget& target) {
   const FloatModeScope mode(FloatMode::frame());
+  const MemoryReserve messages;
+  if (!messages.held()) return no_memory();
   Impl& impl = *impl_;
   uint32_t blocks = 0;
   FIG_RETURN_IF_ERROR(impl.validate(frame, target, blocks));
@@ -322,6 +334,8 @@ Status Renderer::render(const Frame& frame, const ImageTarget& target) {
 
 Result<GaussianView> Renderer::pose_avatar(AvatarId id, const PoseView& pose) {
   const FloatModeScope mode(FloatMode::frame());
+  const MemoryReserve messages;
+  if (!messages.held()) return no_memory();
   FIG_RETURN_IF_ERROR(impl_->validate_avatar(id, pose));
   PosedAvatar& posed = impl_->avatar(id);
   const uint32_t count = posed.body().texel_count();

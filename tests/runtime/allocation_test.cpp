@@ -2,14 +2,10 @@
 // renderer says it holds is about what it took; and the shipped avatar takes, in the precision
 // that a device runs it in, no more than its package says.
 //
-// This program replaces malloc and its kin by counting ones over glibc's own; under a sanitizer,
-// which does the same, the counts are not available.
+// This program counts its allocations (counted_malloc.h); under a sanitizer it cannot.
 #include <gtest/gtest.h>
-#include <malloc.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -18,66 +14,10 @@
 #include <vector>
 
 #include "figurine.h"
+#include "runtime/counted_malloc.h"
 #include "runtime/splat_scene.h"
 #include "runtime/test_packages.h"
 #include "tests/emulated.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define FIG_COUNTS_ALLOCATIONS 0
-#else
-#define FIG_COUNTS_ALLOCATIONS 1
-#endif
-
-namespace {
-std::atomic<uint64_t> g_allocations{0};
-std::atomic<int64_t> g_held_bytes{0}, g_most_held_bytes{0};
-}  // namespace
-
-#if FIG_COUNTS_ALLOCATIONS
-#pragma GCC visibility push(default)  // hidden ones would not take the place of malloc in XNNPACK
-extern "C" {
-void* __libc_malloc(size_t);
-void* __libc_calloc(size_t, size_t);
-void* __libc_realloc(void*, size_t);
-void* __libc_memalign(size_t, size_t);
-void __libc_free(void*);
-
-static void* count(void* block) {
-  g_allocations.fetch_add(1, std::memory_order_relaxed);
-  if (block == nullptr) return block;
-  const auto size = static_cast<int64_t>(malloc_usable_size(block));
-  const int64_t held = g_held_bytes.fetch_add(size, std::memory_order_relaxed) + size;
-  int64_t most = g_most_held_bytes.load(std::memory_order_relaxed);
-  while (held > most && !g_most_held_bytes.compare_exchange_weak(most, held)) {
-  }
-  return block;
-}
-static void uncount(void* block) {
-  if (block != nullptr)
-    g_held_bytes.fetch_sub(static_cast<int64_t>(malloc_usable_size(block)),
-                           std::memory_order_relaxed);
-}
-void* malloc(size_t size) { return count(__libc_malloc(size)); }
-void* calloc(size_t n, size_t size) { return count(__libc_calloc(n, size)); }
-void* realloc(void* block, size_t size) {
-  uncount(block);
-  return count(__libc_realloc(block, size));
-}
-void* memalign(size_t alignment, size_t size) { return count(__libc_memalign(alignment, size)); }
-void* aligned_alloc(size_t alignment, size_t size) {
-  return count(__libc_memalign(alignment, size));
-}
-int posix_memalign(void** block, size_t alignment, size_t size) {
-  *block = count(__libc_memalign(alignment, size));
-  return *block == nullptr ? ENOMEM : 0;
-}
-void free(void* block) {
-  uncount(block);
-  __libc_free(block);
-}
-}
-#pragma GCC visibility pop
-#endif
 
 namespace figurine {
 namespace {

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "figurine/detail/memory_reserve.h"
 #include "figurine/gaussian.h"
 #include "figurine/texel_grid.h"
 #include "formats/src/package/content.h"
@@ -298,6 +299,8 @@ Status check_covariance(std::span<const float> covariance, size_t n, const std::
       }
     }
   }
+  const MemoryReserve reserve(n * n * sizeof(double));
+  if (!reserve.held()) return no_memory();
   return is_positive_definite(covariance, n) ? Status()
                                              : corrupt(field, "is not positive definite");
 }

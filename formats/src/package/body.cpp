@@ -2,6 +2,7 @@
 // weights that are weights.
 #include <cmath>
 
+#include "figurine/detail/memory_reserve.h"
 #include "formats/src/package/content.h"
 
 namespace figurine {
@@ -70,6 +71,8 @@ Status check_mesh_places(const Body& body) {
 
 Status check_border(const Body& body) {
   const size_t texels = size_t(body.uv_size) * body.uv_size;
+  const MemoryReserve reserve(texels / 8);
+  if (!reserve.held()) return no_memory();
   std::vector<bool> taken(texels, false);
   for (uint32_t texel : body.texel) taken[texel] = true;
   for (size_t i = 0; i < body.border_texel.size(); ++i) {

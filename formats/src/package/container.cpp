@@ -178,9 +178,9 @@ Result<Container> open_index(std::span<const std::byte> bytes) {
   return container;
 }
 
-Result<Container> open_container(std::span<const std::byte> bytes, const OpenOptions& options) {
-  Result<Container> opened = open_index(bytes);
-  if (!opened.ok()) return opened;
+Result<Container> open_blobs(const Container& indexed, std::span<const std::byte> bytes,
+                             const OpenOptions& options) {
+  Result<Container> opened = indexed;
   Container& container = *opened;
   container.wanted = WantedParts::of(options, *container.index);
   const auto& entries = *container.index->blobs();

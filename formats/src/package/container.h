@@ -42,9 +42,10 @@ struct Container {
 // Size, magic, header checksum, version, features, kind, exact length; index checksum; Verifier.
 // Without blobs, of which nothing is read.
 Result<Container> open_index(std::span<const std::byte> bytes);
-// Then blobs in order, in range, without gaps or overlaps; of those that are wanted, zero padding
-// behind them and checksums.
-Result<Container> open_container(std::span<const std::byte> bytes, const OpenOptions& options);
+// Then, of what open_index() returned for the same bytes, blobs in order, in range, without gaps or
+// overlaps; of those that are wanted, zero padding behind them and checksums.
+Result<Container> open_blobs(const Container& indexed, std::span<const std::byte> bytes,
+                             const OpenOptions& options);
 
 // Hands out blobs as typed arrays and remembers which were asked for.
 class BlobReader {

@@ -75,6 +75,8 @@ inline constexpr uint32_t kMaxNameBytes = 256;  // names, and the permission and
 inline constexpr uint32_t kMaxBlobNameBytes = 64;
 inline constexpr uint32_t kMaxTextBytes = 4096;    // URLs, data sources, setting values
 inline constexpr uint32_t kMaxListEntries = 1024;  // settings, sources, quality metrics, authors
+inline constexpr uint64_t kMaxReadingBytes =
+    64u << 20;  // that an index's texts and lists may take: a forged one repeats them
 inline constexpr uint32_t kMaxFourierOctaves = 12;
 inline constexpr uint64_t kMaxValueBytes = 1u << 30;  // of one activation of a network
 inline constexpr float kMaxLengthM =

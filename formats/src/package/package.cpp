@@ -5,8 +5,10 @@
 #include <cmath>
 #include <variant>
 
+#include "figurine/detail/memory_reserve.h"
 #include "formats/src/package/checksum.h"
 #include "formats/src/package/content.h"
+#include "formats/src/package/reading_bytes.h"
 
 namespace figurine {
 
@@ -135,6 +137,8 @@ Status check_features(const layout::Header& header, const schema::Index& index,
 
 Result<PackageIdentity> Package::identify(std::span<const std::byte> bytes,
                                           const std::string& name) {
+  const MemoryReserve messages;
+  if (!messages.held()) return no_memory();
   const Result<Container> container = open_index(bytes);
   if (!container.ok()) return container.status().within(name);
   return PackageIdentity{.kind = static_cast<PackageKind>(container->header.kind),
@@ -144,7 +148,15 @@ Result<PackageIdentity> Package::identify(std::span<const std::byte> bytes,
 
 Result<Package> Package::open(std::span<const std::byte> bytes, const std::string& name,
                               const OpenOptions& options) {
-  const Result<Container> container = open_container(bytes, options);
+  const MemoryReserve messages;
+  if (!messages.held()) return no_memory();
+  const Result<Container> indexed = open_index(bytes);
+  if (!indexed.ok()) return indexed.status().within(name);
+  const Result<uint64_t> reading_bytes = find_reading_bytes(*indexed->index);
+  if (!reading_bytes.ok()) return reading_bytes.status().within(name);
+  const MemoryReserve contents_reserve(*reading_bytes);
+  if (!contents_reserve.held()) return no_memory().within(name);
+  const Result<Container> container = open_blobs(*indexed, bytes, options);
   if (!container.ok()) return container.status().within(name);
 
   auto contents = std::make_unique<Contents>();

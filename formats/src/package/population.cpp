@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "figurine/detail/memory_reserve.h"
 #include "figurine/detail/rans.h"
 #include "formats/src/package/content.h"
 #include "formats/src/package/text.h"
@@ -75,13 +76,15 @@ Status read_member_table(const schema::Member& table, size_t quality_count, Popu
   out.split = static_cast<Split>(table.split());
   FIG_RETURN_IF_ERROR(read_maps_and_head(table, "avatar", out));
   if (table.golden() != nullptr) FIG_RETURN_IF_ERROR(read_golden_view(*table.golden(), out.golden));
-  if (const auto* quality = table.quality(); quality != nullptr && quality->size() > 0) {
+  const auto* quality = table.quality();
+  const size_t figures = quality == nullptr ? 0 : quality->size();
+  if (figures != quality_count)
+    return corrupt("quality", "has ", figures, " figures for ", quality_count, " names");
+  if (figures > 0) {
     // By bytes: the Verifier wants no alignment of a vector's elements, and a forged one has none.
-    out.quality.resize(quality->size());
-    std::memcpy(out.quality.data(), quality->Data(), out.quality.size() * sizeof(double));
+    out.quality.resize(figures);
+    std::memcpy(out.quality.data(), quality->Data(), figures * sizeof(double));
   }
-  if (out.quality.size() != quality_count)
-    return corrupt("quality", "has ", out.quality.size(), " figures for ", quality_count, " names");
   for (const double value : out.quality) {
     if (std::isinf(value)) return corrupt("quality", "a figure is infinite");
   }
@@ -222,6 +225,8 @@ Status read_statistics(const schema::Population& table, BlobReader& blobs, Popul
   FIG_RETURN_IF_ERROR(check_magnitude(out.pose_mean, "pose.mean", 100));
   FIG_RETURN_IF_ERROR(blobs.read("pose.factor", {members, n * (n + 1) / 2}, out.pose_factor));
   FIG_RETURN_IF_ERROR(check_halves(out.pose_factor, "pose.factor"));
+  const MemoryReserve reserve(size_t{n} * n * sizeof(float));
+  if (!reserve.held()) return no_memory();
   std::vector<float> covariance(size_t{n} * n);
   for (uint32_t m = 0; m < members; ++m) {
     pose_covariance(out, m, covariance);

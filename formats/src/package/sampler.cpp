@@ -9,6 +9,7 @@
 #include <limits>
 #include <numeric>
 
+#include "figurine/detail/memory_reserve.h"
 #include "formats/src/package/content.h"
 #include "formats/src/package/text.h"
 
@@ -76,6 +77,8 @@ Status read_group(const schema::SampledStaticGroup& table, size_t number, BlobRe
   out.grid_size = table.grid_size();
   if (out.row.size() > uint64_t{kMaxUvSize} * kMaxUvSize)
     return over_limit(name + ".row", "has more rows than a map has texels");
+  const MemoryReserve reserve(out.row.size() / 8);
+  if (!reserve.held()) return no_memory();
   if (!is_permutation_of_rows(out.row))
     return corrupt(name + ".row", "does not name every row of its values once");
   if (table.patch_rows()->size() > layout::kMaxListEntries)
@@ -104,6 +107,8 @@ Status read_groups(const schema::Sampler& table, BlobReader& blobs, Sampler& out
     FIG_RETURN_IF_ERROR(read_group(*table.static_groups()->Get(g), g, blobs, group));
     most = std::max(most, group.row.size() * std::min<size_t>(group.channels, kStaticChannels));
   }
+  const MemoryReserve reserve(most);
+  if (!reserve.held()) return no_memory();
   const std::vector<int8_t> zeros(most);
   for (const SampledStaticGroup& group : out.static_groups) {
     const size_t values = group.row.size() * std::min<size_t>(group.channels, kStaticChannels);

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <new>
 #include <span>
@@ -16,6 +15,7 @@
 #include <utility>
 
 #include "figurine/check.h"
+#include "figurine/detail/memory_reserve.h"
 #include "figurine/status.h"
 
 namespace figurine {
@@ -23,6 +23,10 @@ namespace figurine {
 inline constexpr size_t kBufferAlignment = 64;
 inline constexpr size_t kBufferPadding =
     64;  // addressable bytes behind the last element: XNNPACK and vector loads read past the end
+
+// Memory of a Buffer's, of zeros, in the place of `old`, which is freed; null, and old stays, if
+// there is none. Out of line: buffers grow in a hundred places.
+void* renew_buffer(void* old, size_t size_bytes);
 
 template <class T>
 class Buffer {
@@ -44,11 +48,8 @@ class Buffer {
   bool ensure(size_t count) {
     if (count <= capacity_) return true;
     if (count > (std::numeric_limits<size_t>::max() - kBufferPadding) / sizeof(T)) return false;
-    const size_t size_bytes = count * sizeof(T) + kBufferPadding;
-    void* fresh = ::operator new(size_bytes, std::align_val_t(kBufferAlignment), std::nothrow);
+    void* const fresh = renew_buffer(data_, count * sizeof(T) + kBufferPadding);
     if (fresh == nullptr) return false;
-    std::memset(fresh, 0, size_bytes);
-    ::operator delete(data_, std::align_val_t(kBufferAlignment));
     data_ = static_cast<T*>(fresh);
     capacity_ = count;
     return true;
@@ -75,8 +76,8 @@ class Buffer {
   size_t capacity_ = 0;
 };
 
-inline Status out_of_memory(const char* what) {
-  return Status(StatusCode::kOutOfMemory, std::string("no memory for ") + what);
-}
+// "no memory for WHAT". Out of line: inline at each of its fifty callers it would make the device's
+// library 2 % larger.
+Status out_of_memory(const char* what);
 
 }  // namespace figurine

@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include "figurine/detail/memory_reserve.h"
 #include "runtime/src/base/drop_in_pthreadpool.h"
 
 namespace figurine {
@@ -83,6 +84,8 @@ Result<ThreadPool> ThreadPool::create(uint32_t threads) {
 }
 
 Result<std::shared_ptr<ThreadPool>> make_thread_pool(const ThreadOptions& options) {
+  const MemoryReserve reserve;
+  if (!reserve.held()) return no_memory();
   uint32_t threads = options.threads;
   if (threads <= ThreadPool::kMaxThreads && !options.allow_oversubscription)
     threads = std::min(threads, allowed_cpus());

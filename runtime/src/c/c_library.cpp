@@ -37,14 +37,15 @@ void fig_set_check_handler(fig_check_handler handler, void* user) {
 }
 
 const char* fig_isa_name(fig_isa isa) {
-  const Result<std::optional<Isa>> known = c::isa_of(isa);
-  if (!known.ok()) return "unknown instruction set";
-  return *known ? to_string(**known) : "best";
+  if (isa > FIG_ISA_AVX512) return "unknown instruction set";
+  return isa == FIG_ISA_BEST ? "best" : to_string(static_cast<Isa>(isa - 1));
 }
 
 int fig_isa_supported(fig_isa isa) {
-  const Result<std::optional<Isa>> known = c::isa_of(isa);
-  if (!known.ok()) return 0;
+  if (isa > FIG_ISA_AVX512) return 0;
   const std::span<const Isa> all = supported_isas();
-  return !*known || std::find(all.begin(), all.end(), **known) != all.end() ? 1 : 0;
+  return isa == FIG_ISA_BEST ||
+                 std::find(all.begin(), all.end(), static_cast<Isa>(isa - 1)) != all.end()
+             ? 1
+             : 0;
 }

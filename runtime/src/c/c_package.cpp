@@ -215,6 +215,7 @@ void fig_set_default_orbit(fig_orbit* value, size_t struct_bytes) {
 
 fig_status fig_package_open(const void* bytes, size_t size_bytes,
                             const fig_package_options* options, fig_package* package) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(package, "package"));
   *package = {0};
   fig_package_options read = fig_default_package_options();
@@ -241,10 +242,12 @@ fig_status fig_package_open(const void* bytes, size_t size_bytes,
 }
 
 fig_status fig_package_close(fig_package package) {
+  const MemoryReserve messages;
   return report(handles().remove<PackageObject>(package.id).status());
 }
 
 fig_status fig_package_get_info(fig_package package, fig_package_info* info) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(info, "package info"));
   const Result<Pin<PackageObject>> pinned = handles().pin<PackageObject>(package.id);
   if (!pinned.ok()) return report(pinned.status());
@@ -262,6 +265,7 @@ fig_status fig_package_get_info(fig_package package, fig_package_info* info) {
 }
 
 fig_status fig_package_joint(fig_package body, uint32_t joint, fig_joint* info) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(info, "joint"));
   const Result<Pin<PackageObject>> pinned = pin_package(body, PackageKind::kBody);
   if (!pinned.ok()) return report(pinned.status());
@@ -279,6 +283,7 @@ fig_status fig_package_joint(fig_package body, uint32_t joint, fig_joint* info) 
 }
 
 fig_status fig_package_member_name(fig_package population, uint32_t member, const char** name) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(name, "name"));
   const Result<Pin<PackageObject>> pinned = pin_package(population, PackageKind::kPopulation);
   if (!pinned.ok()) return report(pinned.status());
@@ -290,6 +295,7 @@ fig_status fig_package_member_name(fig_package population, uint32_t member, cons
 
 fig_status fig_package_find_member(fig_package population, const char* name_or_number,
                                    uint32_t* member) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(name_or_number, "name"));
   FIG_REPORT_IF_ERROR(check_out(member, "member"));
   const Result<Pin<PackageObject>> pinned = pin_package(population, PackageKind::kPopulation);
@@ -305,6 +311,7 @@ fig_status fig_package_find_member(fig_package population, const char* name_or_n
 
 fig_status fig_make_orbit_camera(const fig_orbit* orbit, uint32_t width_px, uint32_t height_px,
                                  fig_camera* camera) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(camera, "camera"));
   fig_orbit read = fig_default_orbit();
   FIG_REPORT_IF_ERROR(read_options(orbit, "orbit", read));
@@ -322,6 +329,7 @@ fig_status fig_make_orbit_camera(const fig_orbit* orbit, uint32_t width_px, uint
 
 fig_status fig_package_golden_view(fig_package package, uint32_t member, fig_camera* camera,
                                    fig_pose* pose) {
+  FIG_RESERVE_OR_REPORT();
   if (camera != nullptr) FIG_REPORT_IF_ERROR(check_struct(camera, "camera"));
   if (pose != nullptr) FIG_REPORT_IF_ERROR(check_struct(pose, "pose"));
   const Result<Pin<PackageObject>> pinned = handles().pin<PackageObject>(package.id);
@@ -335,6 +343,7 @@ fig_status fig_package_golden_view(fig_package package, uint32_t member, fig_cam
 }
 
 fig_status fig_package_motion_pose(fig_package motion, uint32_t frame, fig_pose* pose) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(pose, "pose"));
   const Result<Pin<PackageObject>> pinned = pin_package(motion, PackageKind::kMotion);
   if (!pinned.ok()) return report(pinned.status());

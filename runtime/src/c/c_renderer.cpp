@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "figurine/renderer.h"
+#include "runtime/src/base/content_bytes.h"
 #include "runtime/src/c/c_package.h"
 #include "runtime/src/c/c_sampler.h"
 #include "runtime/src/c/isa.h"
@@ -38,8 +39,8 @@ struct RendererObject final : Object {
   std::unique_ptr<Renderer> renderer;
   std::vector<uint64_t> avatars;  // handles of its AvatarObjects
   // A frame's arrays in C++; they grow and stay, so that a frame allocates nothing.
-  std::vector<FrameAvatar> seen;
-  std::vector<GaussianView> gaussians;
+  Buffer<FrameAvatar> seen;
+  Buffer<GaussianView> gaussians;
 };
 
 // What an avatar borrows. It is touched by calls alone that have its renderer to themselves.
@@ -75,6 +76,14 @@ Result<std::optional<Precision>> precision_of(const fig_avatar_options* given) {
                                                                          : Precision::kFixedPoint);
 }
 
+// Of a copy of what content_of() returns.
+size_t copy_bytes(const Package& package) {
+  if (package.kind() == PackageKind::kAvatar) return content_bytes(package.avatar());
+  if (package.kind() != PackageKind::kPopulation) return kSmallReserveBytes;
+  const Population& population = package.population();
+  return content_bytes(population.network, population.static_part.groups.size());
+}
+
 // An avatar package's content, or a population's member, opened into the object's storage.
 Result<Avatar> content_of(const Package& package, uint32_t member, AvatarObject& object) {
   if (package.kind() != PackageKind::kPopulation) {
@@ -98,6 +107,8 @@ Status add(RendererObject& renderer, fig_renderer handle, const Avatar& avatar,
            fig_avatar* out) {
   const Result<std::optional<Precision>> precision = precision_of(options);
   if (!precision.ok()) return precision.status();
+  const MemoryReserve list(2 * sizeof(uint64_t) * (renderer.avatars.size() + 1));
+  if (!list.held()) return no_memory();
   const Result<AvatarId> id =
       renderer.renderer->add_avatar(avatar, object->body->package, *precision);
   if (!id.ok()) return id.status();
@@ -139,15 +150,14 @@ Status read_element(const T* array, size_t i, T& out) {
              : invalid("element: struct_bytes differs from the first's");
 }
 
-Status read_avatar(const fig_frame& frame, size_t i, fig_renderer renderer,
-                   RendererObject& object) {
+Status read_avatar(const fig_frame& frame, size_t i, fig_renderer renderer, FrameAvatar& seen) {
   fig_frame_avatar given = fig_default_frame_avatar();
   FIG_RETURN_IF_ERROR(read_element(frame.avatars, i, given));
   const Result<AvatarId> id = avatar_of(renderer, given.avatar);
   if (!id.ok()) return id.status();
   const Result<PoseView> pose = pose_of(given.pose);
   if (!pose.ok()) return pose.status();
-  FrameAvatar& seen = object.seen.emplace_back(FrameAvatar{.avatar = *id, .pose = *pose});
+  seen = FrameAvatar{.avatar = *id, .pose = *pose};
   if (given.coarse.id == 0) return {};
   const Result<AvatarId> coarse = avatar_of(renderer, given.coarse);
   if (!coarse.ok()) return coarse.status().within("coarse");
@@ -155,26 +165,27 @@ Status read_avatar(const fig_frame& frame, size_t i, fig_renderer renderer,
   return {};
 }
 
-Status read_gaussians(const fig_frame& frame, size_t i, RendererObject& object) {
+Status read_gaussians(const fig_frame& frame, size_t i, GaussianView& gaussians) {
   fig_gaussians given = fig_default_gaussians();
   FIG_RETURN_IF_ERROR(read_element(frame.gaussians, i, given));
   const Result<GaussianView> view = gaussians_of(given);
   if (!view.ok()) return view.status();
-  object.gaussians.push_back(*view);
+  gaussians = *view;
   return {};
 }
 
 // Fills the object's arrays.
 Status read_arrays(const fig_frame& frame, fig_renderer renderer, RendererObject& object) {
-  object.seen.clear(), object.gaussians.clear();
   if (frame.avatar_count > 0) FIG_RETURN_IF_ERROR(check_out(frame.avatars, "avatars"));
   if (frame.gaussians_count > 0) FIG_RETURN_IF_ERROR(check_out(frame.gaussians, "gaussians"));
+  if (!object.seen.ensure(frame.avatar_count) || !object.gaussians.ensure(frame.gaussians_count))
+    return out_of_memory("a frame's avatars and Gaussians");
   for (size_t i = 0; i < frame.avatar_count; ++i) {
-    const Status read = read_avatar(frame, i, renderer, object);
+    const Status read = read_avatar(frame, i, renderer, object.seen[i]);
     if (!read.ok()) return read.within("avatars[" + std::to_string(i) + "]");
   }
   for (size_t i = 0; i < frame.gaussians_count; ++i) {
-    const Status read = read_gaussians(frame, i, object);
+    const Status read = read_gaussians(frame, i, object.gaussians[i]);
     if (!read.ok()) return read.within("gaussians[" + std::to_string(i) + "]");
   }
   return {};
@@ -216,8 +227,8 @@ Result<Frame> frame_of(const fig_frame* given, fig_renderer renderer, RendererOb
   if (read.fast_blend > 1) return invalid("frame: fast_blend: neither 0 nor 1");
   FIG_RETURN_IF_ERROR(read_arrays(read, renderer, object));
   Frame frame{.camera = *camera,
-              .avatars = object.seen,
-              .gaussians = object.gaussians,
+              .avatars = object.seen.span(read.avatar_count),
+              .gaussians = object.gaussians.span(read.gaussians_count),
               .background = std::nullopt,
               .splat = {.alpha_cut = read.alpha_cut, .antialiased = *antialiased},
               .leave_out = *leave_out,
@@ -336,6 +347,7 @@ void fig_set_default_statistics(fig_statistics* value, size_t struct_bytes) {
 }
 
 fig_status fig_threads_create(uint32_t threads, fig_threads* created) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(created, "threads"));
   *created = {0};
   Result<std::shared_ptr<ThreadPool>> pool = make_thread_pool({.threads = threads});
@@ -350,10 +362,12 @@ fig_status fig_threads_create(uint32_t threads, fig_threads* created) {
 }
 
 fig_status fig_threads_destroy(fig_threads threads) {
+  const MemoryReserve messages;
   return report(handles().remove<ThreadsObject>(threads.id).status());
 }
 
 fig_status fig_renderer_create(const fig_renderer_options* options, fig_renderer* renderer) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(renderer, "renderer"));
   *renderer = {0};
   fig_renderer_options read = fig_default_renderer_options();
@@ -380,6 +394,7 @@ fig_status fig_renderer_create(const fig_renderer_options* options, fig_renderer
 }
 
 fig_status fig_renderer_destroy(fig_renderer renderer) {
+  const MemoryReserve messages;
   Result<std::unique_ptr<RendererObject>> removed = handles().remove<RendererObject>(renderer.id);
   if (!removed.ok()) return report(removed.status());
   (*removed)->renderer.reset();  // before what its avatars borrow
@@ -391,6 +406,7 @@ fig_status fig_renderer_destroy(fig_renderer renderer) {
 fig_status fig_renderer_add_avatar(fig_renderer renderer, fig_package package, uint32_t member,
                                    fig_package body, const fig_avatar_options* options,
                                    fig_avatar* avatar) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(avatar, "avatar"));
   *avatar = {0};
   const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
@@ -401,6 +417,8 @@ fig_status fig_renderer_add_avatar(fig_renderer renderer, fig_package package, u
   if (!on.ok()) return report(on.status().within("body"));
   std::unique_ptr<AvatarObject> object(new (std::nothrow) AvatarObject);
   if (object == nullptr) return report(out_of_memory("an avatar"));
+  const MemoryReserve reserve(copy_bytes((*from)->package));
+  if (!reserve.held()) return report_no_memory();
   const Result<Avatar> content = content_of((*from)->package, member, *object);
   if (!content.ok()) return report(content.status());
   object->package = std::move(*from);
@@ -410,6 +428,7 @@ fig_status fig_renderer_add_avatar(fig_renderer renderer, fig_package package, u
 
 fig_status fig_renderer_add_sampled(fig_renderer renderer, fig_sampled sampled, fig_package body,
                                     const fig_avatar_options* options, fig_avatar* avatar) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(avatar, "avatar"));
   *avatar = {0};
   const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
@@ -427,6 +446,7 @@ fig_status fig_renderer_add_sampled(fig_renderer renderer, fig_sampled sampled, 
 }
 
 fig_status fig_renderer_remove_avatar(fig_renderer renderer, fig_avatar avatar) {
+  const MemoryReserve messages;
   const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
   if (!pinned.ok()) return report(pinned.status());
   const Result<AvatarId> id = avatar_of(renderer, avatar);
@@ -437,6 +457,7 @@ fig_status fig_renderer_remove_avatar(fig_renderer renderer, fig_avatar avatar) 
 }
 
 fig_status fig_renderer_get_info(fig_renderer renderer, fig_renderer_info* info) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(info, "renderer info"));
   const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
   if (!pinned.ok()) return report(pinned.status());
@@ -451,6 +472,7 @@ fig_status fig_renderer_get_info(fig_renderer renderer, fig_renderer_info* info)
 
 fig_status fig_renderer_avatar_precision(fig_renderer renderer, fig_avatar avatar,
                                          fig_precision* precision) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(precision, "precision"));
   const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
   if (!pinned.ok()) return report(pinned.status());
@@ -463,6 +485,7 @@ fig_status fig_renderer_avatar_precision(fig_renderer renderer, fig_avatar avata
 
 fig_status fig_renderer_render(fig_renderer renderer, const fig_frame* frame,
                                const fig_image* image) {
+  FIG_RESERVE_OR_REPORT();
   const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
   if (!pinned.ok()) return report(pinned.status());
   const Result<Frame> wanted = frame_of(frame, renderer, **pinned);
@@ -474,6 +497,7 @@ fig_status fig_renderer_render(fig_renderer renderer, const fig_frame* frame,
 
 fig_status fig_renderer_pose_avatar(fig_renderer renderer, fig_avatar avatar, const fig_pose* pose,
                                     fig_gaussians* gaussians) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(gaussians, "gaussians"));
   const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
   if (!pinned.ok()) return report(pinned.status());
@@ -495,6 +519,7 @@ fig_status fig_renderer_pose_avatar(fig_renderer renderer, fig_avatar avatar, co
 }
 
 fig_status fig_renderer_statistics(fig_renderer renderer, fig_statistics* statistics) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(statistics, "statistics"));
   const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
   if (!pinned.ok()) return report(pinned.status());

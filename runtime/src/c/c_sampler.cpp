@@ -85,6 +85,7 @@ void fig_set_default_convolution(fig_convolution* value, size_t struct_bytes) {
 
 fig_status fig_sampler_create(fig_package package, const fig_sampler_options* options,
                               fig_sampler* sampler) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(sampler, "sampler"));
   *sampler = {0};
   fig_sampler_options read = fig_default_sampler_options();
@@ -108,11 +109,13 @@ fig_status fig_sampler_create(fig_package package, const fig_sampler_options* op
 }
 
 fig_status fig_sampler_destroy(fig_sampler sampler) {
+  const MemoryReserve messages;
   return report(handles().remove<SamplerObject>(sampler.id).status());
 }
 
 fig_status fig_sampler_sample(fig_sampler sampler, const fig_sample_options* options,
                               fig_sampled* sampled) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_out(sampled, "sampled avatar"));
   *sampled = {0};
   fig_sample_options read = fig_default_sample_options();
@@ -133,10 +136,12 @@ fig_status fig_sampler_sample(fig_sampler sampler, const fig_sample_options* opt
 }
 
 fig_status fig_sampled_destroy(fig_sampled sampled) {
+  const MemoryReserve messages;
   return report(handles().remove<SampledObject>(sampled.id).status());
 }
 
 fig_status fig_sampled_get_info(fig_sampled sampled, fig_sampled_info* info) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(info, "sampled info"));
   const Result<Pin<SampledObject>> pinned = handles().pin<SampledObject>(sampled.id);
   if (!pinned.ok()) return report(pinned.status());
@@ -156,6 +161,7 @@ fig_status fig_sampled_get_info(fig_sampled sampled, fig_sampled_info* info) {
 
 fig_status fig_sampled_convolution(fig_sampled sampled, uint32_t convolution,
                                    fig_convolution* info) {
+  FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(info, "convolution"));
   const Result<Pin<SampledObject>> pinned = handles().pin<SampledObject>(sampled.id);
   if (!pinned.ok()) return report(pinned.status());

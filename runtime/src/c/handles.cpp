@@ -3,6 +3,8 @@
 #include <limits>
 #include <string>
 
+#include "figurine/detail/memory_reserve.h"
+
 namespace figurine::c {
 namespace {
 
@@ -47,8 +49,11 @@ Result<uint64_t> HandleTable::add(ObjectKind kind, std::unique_ptr<Object> objec
   if (free_.empty()) {
     if (slots_.size() >= kMaxGeneration - 1)
       return Status(StatusCode::kLimitExceeded, "handles: no further place");
-    free_.push_back(static_cast<uint32_t>(slots_.size()));
+    const MemoryReserve reserve(4 * (slots_.size() + 1) * (sizeof(Slot) + sizeof(uint32_t)));
+    if (!reserve.held()) return no_memory();
     slots_.emplace_back();
+    free_.reserve(slots_.capacity());  // so that remove() allocates nothing
+    free_.push_back(static_cast<uint32_t>(slots_.size() - 1));
   }
   const uint32_t index = free_.back();
   free_.pop_back();

@@ -63,7 +63,7 @@ class HandleTable {
 
   enum class Use : uint8_t { kShared, kExclusive };
 
-  // The new thing's handle. kLimitExceeded.
+  // The new thing's handle. kLimitExceeded, kOutOfMemory.
   template <class T>
   Result<uint64_t> add(std::unique_ptr<T> object) {
     return add(T::kKind, std::move(object));

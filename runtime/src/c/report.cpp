@@ -34,6 +34,8 @@ fig_status report(const Status& status) {
   return static_cast<fig_status>(status.code());
 }
 
+fig_status report_no_memory() { return report(no_memory()); }
+
 }  // namespace figurine::c
 
 const char* fig_last_message(void) { return figurine::c::last_message; }

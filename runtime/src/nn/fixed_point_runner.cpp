@@ -89,7 +89,8 @@ void requantise_all(const int32_t* __restrict sums, const float* __restrict mult
     to[o] = requantise(sums[o], multiplier[o], zero_point, lowest);
 }
 
-void quantise_all(const float* __restrict from, float scale, size_t count, int16_t* __restrict to) {
+[[gnu::noinline]] void quantise_all(const float* __restrict from, float scale, size_t count,
+                                    int16_t* __restrict to) {
   for (size_t i = 0; i < count; ++i) to[i] = quantise_input(from[i], scale);
 }
 
@@ -118,7 +119,8 @@ Status FixedPointRunner::prepare(const Network& network, const FixedPointNetwork
             "the input's channels");
   input_scale_ = fixed.values[0].scale;
   macs_ = count_macs(network, shapes);
-  for (const float value : use.constants) constants_.push_back(quantise_input(value, input_scale_));
+  if (!constants_.ensure(use.constants.size())) return out_of_memory("a network's constants");
+  quantise_all(use.constants.data(), input_scale_, use.constants.size(), constants_.data());
   if (!map_.ensure(size_, use.varying_channels)) return out_of_memory("a network's input");
   input_count_ = texels * map_.stride();
   if (!input_.ensure(input_count_)) return out_of_memory("a network's input");
@@ -145,7 +147,8 @@ Status FixedPointRunner::prepare_first(const Network& network, const FixedPointN
   FirstConvolution& first = first_.emplace_back();
   const ValueShape input{size_, network.input_channels};
   const size_t texels = size_t{size_} * size_;
-  if (!first.sums.prepare(kernels_, layer, convolution, input, use.varying_channels, constants_) ||
+  if (!first.sums.prepare(kernels_, layer, convolution, input, use.varying_channels,
+                          constants_.span(use.constants.size())) ||
       !first.multiplier.ensure(layer.out_channels) || !first.active.ensure(texels) ||
       !first.output.ensure(texels * layer.out_channels)) {
     return out_of_memory("a network's first convolution");
@@ -182,7 +185,7 @@ Status FixedPointRunner::prepare_middle(const Network& network, const FixedPoint
   xnnpack_bytes_ = estimate_xnnpack_bytes(network, shapes, plan, sizeof(int8_t));
   head_input_ = middle_.data();
   return FixedPointGraphBuilder(network, shapes, plan, fixed)
-      .build(buffers, pool_, runtime_)
+      .build(buffers, xnnpack_bytes_, pool_, runtime_)
       .within("network");
 }
 
@@ -192,9 +195,9 @@ Status FixedPointRunner::prepare_head(const Network& network, const FixedPointNe
   const FixedPointConvolution& convolution = fixed.convolutions.back();
   const Quantisation& quantisation = fixed.values[layer.inputs[0]];
   const bool reads_input = layer.inputs[0] == 0;
-  if (!head_.prepare(
-          kernels_, layer, convolution, input, reads_input ? use.varying_channels : input.channels,
-          reads_input ? std::span<const int16_t>(constants_) : std::span<const int16_t>()) ||
+  if (!head_.prepare(kernels_, layer, convolution, input,
+                     reads_input ? use.varying_channels : input.channels,
+                     reads_input ? constants_.span(use.constants.size()) : std::span<int16_t>()) ||
       !head_scale_.ensure(layer.out_channels) ||
       !output_.ensure(use.wanted.size() * layer.out_channels)) {
     return out_of_memory("a network's last convolution");

@@ -98,7 +98,7 @@ class FixedPointRunner {
   float input_scale_ = 1;
   Buffer<float> input_;
   PaddedMap map_;  // the input in int16
-  std::vector<int16_t> constants_;
+  Buffer<int16_t> constants_;
   std::vector<FirstConvolution> first_;
   XnnRuntime runtime_;  // null if no layer is left for XNNPACK
   Buffer<int8_t> middle_;

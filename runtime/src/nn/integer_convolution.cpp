@@ -1,7 +1,6 @@
 #include "runtime/src/nn/integer_convolution.h"
 
 #include <algorithm>
-#include <vector>
 
 namespace figurine {
 
@@ -45,13 +44,15 @@ bool IntegerConvolution::fold(const KernelTable& kernels, const Layer& layer,
   // The same convolution over the constant channels alone, as if they varied.
   IntegerConvolution rest;
   PaddedMap map;
-  std::vector<int8_t> weights(outputs_ * taps * count);
+  Buffer<int8_t> weights;
+  if (!weights.ensure(outputs_ * taps * count)) return false;
   for (size_t row = 0; row < outputs_ * taps; ++row) {
     std::copy_n(convolution.weights.data() + row * in_channels + varying_, count,
                 weights.data() + row * count);
   }
-  const FixedPointConvolution of_constants{
-      .weights = weights, .weight_scale = convolution.weight_scale, .bias = convolution.bias};
+  const FixedPointConvolution of_constants{.weights = weights.span(outputs_ * taps * count),
+                                           .weight_scale = convolution.weight_scale,
+                                           .bias = convolution.bias};
   if (!map.ensure(size_, count) ||
       !rest.prepare(kernels, layer, of_constants, {size_, count}, count, {}))
     return false;

@@ -67,7 +67,7 @@ Result<std::unique_ptr<NetworkRunner>> NetworkRunner::create(const Network& netw
   runner->xnnpack_bytes_ = estimate_xnnpack_bytes(network, shapes, plan, sizeof(float));
   void* const buffers[] = {runner->input_.data(), runner->output_.data()};
   FIG_RETURN_IF_ERROR(FloatGraphBuilder(network, shapes, plan)
-                          .build(buffers, pool, runner->runtime_)
+                          .build(buffers, runner->xnnpack_bytes_, pool, runner->runtime_)
                           .within("network"));
   return runner;
 }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "runtime/src/base/drop_in_pthreadpool.h"
+#include "runtime/src/nn/xnnpack_memory.h"
 
 namespace figurine {
 namespace {
@@ -40,7 +41,11 @@ Status xnnpack_status(xnn_status status, const char* what) {
 Status initialize_xnnpack() {
   // It asks cpuinfo for the CPU, which on Linux reads files; on ARM it gives up without the lists
   // of CPUs in /sys, which containers and phones may hide.
-  const xnn_status status = xnn_initialize(nullptr);
+  // What it needs for that is not asked for by its allocator, and if it is not had once it is not
+  // asked for again.
+  constexpr size_t kStartBytes = 64 << 10;
+  if (!MemoryReserve(kStartBytes).held()) return out_of_memory("starting XNNPACK");
+  const xnn_status status = xnn_initialize(&xnnpack_allocator());
   if (status == xnn_status_success) return {};
   Status error = xnnpack_status(status, "cannot start");
   if (status == xnn_status_out_of_memory) return error;
@@ -57,8 +62,14 @@ pthreadpool* xnnpack_pool(const ThreadPool& pool) {
 
 void XnnRuntimeDeleter::operator()(xnn_runtime* runtime) const { xnn_delete_runtime(runtime); }
 
-Status GraphBuilder::build(std::span<void* const> buffers, ThreadPool& pool, XnnRuntime& runtime) {
+Status GraphBuilder::build(std::span<void* const> buffers, uint64_t estimated_bytes,
+                           ThreadPool& pool, XnnRuntime& runtime) {
   FIG_RETURN_IF_ERROR(reserve_copies());
+  // Of all that XNNPACK takes: packed weights and the rest that can be told beforehand, and beside
+  // it what it knows of each layer.
+  constexpr size_t kOfLayer = 16 << 10;
+  const XnnpackRoom room(estimated_bytes * 5 / 4 + kOfLayer * (network_.layers.size() + 4));
+  if (!room.held()) return out_of_memory("a network");
   const uint32_t external_count = static_cast<uint32_t>(plan_.inputs.size()) + 1;
   FIG_CHECK(buffers.size() == external_count, "a buffer for every input and the output");
   xnn_subgraph_t subgraph = nullptr;

@@ -71,8 +71,9 @@ class GraphBuilder {
   virtual ~GraphBuilder() = default;
 
   // Builds, packs, plans, and points at the fixed buffers of the plan's inputs, then its output.
-  // Nothing of the builder is needed afterwards.
-  Status build(std::span<void* const> buffers, ThreadPool& pool, XnnRuntime& runtime);
+  // Nothing of the builder is needed afterwards. estimated_bytes: estimate_xnnpack_bytes().
+  Status build(std::span<void* const> buffers, uint64_t estimated_bytes, ThreadPool& pool,
+               XnnRuntime& runtime);
 
  protected:
   // Room in copies_ for all weights.

@@ -97,15 +97,20 @@ class FixedPointAvatarNetwork : public AvatarNetwork {
                                                        ThreadPool& pool,
                                                        const KernelTable& kernels) {
     const uint32_t fourier_channels = 4 * avatar.fourier_octaves;
-    std::vector<float> fourier(size_t{grid.size()} * grid.size() * fourier_channels);
-    draw_fourier_channels(grid.size(), avatar.fourier_octaves, 0, fourier_channels, fourier);
-    std::vector<uint32_t> drawn(grid.cell().begin(), grid.cell().end());
-    drawn.insert(drawn.end(), grid.border_cell().begin(), grid.border_cell().end());
+    const size_t constants = size_t{grid.size()} * grid.size() * fourier_channels,
+                 cells = grid.cell().size() + grid.border_cell().size();
+    Buffer<float> fourier;
+    Buffer<uint32_t> drawn;
+    if (!fourier.ensure(constants) || !drawn.ensure(cells))
+      return out_of_memory("an avatar's network");
+    draw_fourier_channels(grid.size(), avatar.fourier_octaves, 0, fourier_channels,
+                          fourier.span(constants));
+    std::ranges::copy(grid.border_cell(), std::ranges::copy(grid.cell(), drawn.data()).out);
     Result<std::unique_ptr<FixedPointRunner>> runner =
         FixedPointRunner::create(avatar.network, avatar.fixed_point,
                                  {.varying_channels = kMapChannels,
-                                  .constants = fourier,
-                                  .drawn = drawn,
+                                  .constants = fourier.span(constants),
+                                  .drawn = drawn.span(cells),
                                   .wanted = grid.cell()},
                                  pool, kernels);
     if (!runner.ok()) return runner.status();

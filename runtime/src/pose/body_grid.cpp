@@ -1,14 +1,35 @@
 #include "runtime/src/pose/body_grid.h"
 
 #include <algorithm>
+#include <array>
 #include <new>
 #include <vector>
 
+#include "figurine/detail/memory_reserve.h"
 #include "runtime/src/pose/body_blocks.h"
 
 namespace figurine {
 
+namespace {
+
+// Of the lists over texels and cells at once: the grid's four, which grow twofold, and beside them
+// a texel's taps, its chart and the rows that find it, or what covers a cell and how far from it.
+size_t list_bytes(const Body& body, uint32_t size) {
+  const size_t cells = size_t{size} * size, map = size_t{body.uv_size} * body.uv_size;
+  constexpr size_t kLists = 4, kGrowth = 3;
+  const size_t grid = kLists * kGrowth * cells * sizeof(uint32_t),
+               taps = size == body.uv_size
+                          ? 0
+                          : body.texel_count() * (sizeof(GridTaps) + kGrowth * sizeof(uint32_t)) +
+                                (map + cells) * sizeof(uint32_t);
+  return grid + std::max(taps, 3 * cells * sizeof(uint32_t)) + kSmallReserveBytes;
+}
+
+}  // namespace
+
 std::shared_ptr<const BodyGrid> BodyGrid::create(const Body& body, uint32_t size) {
+  const MemoryReserve reserve(list_bytes(body, size));
+  if (!reserve.held()) return nullptr;
   std::shared_ptr<BodyGrid> grid(new (std::nothrow) BodyGrid());
   if (grid == nullptr) return nullptr;
   grid->grid_ = make_texel_grid(body, size);
@@ -33,27 +54,34 @@ bool BodyGrid::lay_taps(const Body& body, uint32_t blocks) {
   return true;
 }
 
+// Cells that the texels of a block tap.
+constexpr size_t kMostTapped = kernels::kTaps * kernels::kLanes;
+
 // Taps of weight 0 count: their values are multiplied as the others' are.
 bool BodyGrid::list_tapped(uint32_t blocks) {
-  std::vector<uint32_t> all, of_block;
-  if (!first_tapped_.ensure(size_t{blocks} + 1)) return false;
-  for (uint32_t block = 0; block < blocks; ++block) {
-    of_block.clear();
+  const auto find_tapped = [&](uint32_t block, std::array<uint32_t, kMostTapped>& tapped) {
     if (of_texels()) {
-      of_block.push_back(block);
-    } else {
-      for (const auto& rows : taps_[block].row) {
-        for (const uint32_t row : rows) of_block.push_back(row / kernels::kLanes);
-      }
-      std::sort(of_block.begin(), of_block.end());
-      of_block.erase(std::unique(of_block.begin(), of_block.end()), of_block.end());
+      tapped[0] = block;
+      return size_t{1};
     }
-    all.insert(all.end(), of_block.begin(), of_block.end());
-    first_tapped_[block + 1] = static_cast<uint32_t>(all.size());
+    size_t count = 0;
+    for (const auto& rows : taps_[block].row) {
+      for (const uint32_t row : rows) tapped[count++] = row / kernels::kLanes;
+    }
+    std::sort(tapped.begin(), tapped.end());
+    return static_cast<size_t>(std::unique(tapped.begin(), tapped.end()) - tapped.begin());
+  };
+  if (!first_tapped_.ensure(size_t{blocks} + 1)) return false;
+  std::array<uint32_t, kMostTapped> tapped{};
+  for (uint32_t block = 0; block < blocks; ++block)
+    first_tapped_[block + 1] =
+        first_tapped_[block] + static_cast<uint32_t>(find_tapped(block, tapped));
+  tapped_count_ = first_tapped_[blocks];
+  if (!tapped_.ensure(tapped_count_)) return false;
+  for (uint32_t block = 0; block < blocks; ++block) {
+    const size_t count = find_tapped(block, tapped);
+    std::copy_n(tapped.begin(), count, tapped_.data() + first_tapped_[block]);
   }
-  tapped_count_ = all.size();
-  if (!tapped_.ensure(all.size())) return false;
-  std::copy(all.begin(), all.end(), tapped_.data());
   return true;
 }
 

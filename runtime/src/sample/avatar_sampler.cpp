@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "figurine/detail/double_math.h"
+#include "runtime/src/base/content_bytes.h"
 #include "runtime/src/base/float_mode.h"
 #include "runtime/src/base/memory.h"
 #include "runtime/src/kernels/table.h"
@@ -42,6 +43,17 @@ struct AvatarSampler::Impl {
     const size_t size = sampler.direction_scale.size();
     return z.ensure(size) && x0.ensure(size) && previous_x0.ensure(size) && noisy.ensure(size) &&
            clean.ensure(size);
+  }
+
+  // Of a sample, with room for so many weights and integers: all that it is stored in.
+  size_t sample_bytes(size_t weights, size_t integers) const {
+    size_t static_integers = 0;
+    for (const SampledStaticGroup& group : sampler.static_groups)
+      static_integers += group.row.size() * group.channels;
+    return content_bytes(sampler) + (kMaxSolverSteps + 1) * sizeof(NoiseLevel) +
+           (weights < sampler.mean.size() ? sampler.mean.size() * sizeof(float) : 0) +
+           (integers < static_integers ? static_integers : 0) +
+           (sampler.shares_network ? 0 : sampler.mean.size() * sizeof(int8_t));
   }
 
   // The start: standard normal, whatever the mix.
@@ -146,6 +158,8 @@ AvatarSampler::~AvatarSampler() = default;
 Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& sampler,
                                                              std::optional<Isa> isa) {
   const FloatModeScope mode(FloatMode::exact());
+  const MemoryReserve reserve(content_bytes(sampler));
+  if (!reserve.held()) return no_memory();
   const Result<const KernelTable*> kernels = kernels_for(isa.value_or(supported_isas().back()));
   if (!kernels.ok()) return kernels.status();
   std::unique_ptr<Impl> impl(new (std::nothrow) Impl(sampler));
@@ -158,13 +172,17 @@ Result<std::unique_ptr<AvatarSampler>> AvatarSampler::create(const Sampler& samp
   if (!transformer.ok()) return transformer.status();
   impl->transformer = std::move(*transformer);
   impl->isa = (*kernels)->isa;
-  return std::unique_ptr<AvatarSampler>(new AvatarSampler(std::move(impl)));
+  std::unique_ptr<AvatarSampler> made(new (std::nothrow) AvatarSampler(std::move(impl)));
+  if (made == nullptr) return out_of_memory("the sampler");
+  return made;
 }
 
 Status AvatarSampler::sample(const SampleRequest& request, SampledAvatar& out, Trace* trace) {
   // Weights are data, of which denormals are a part; they were trained and hashed with them.
   const FloatModeScope mode(FloatMode::exact());
   Impl& impl = *impl_;
+  const MemoryReserve reserve(impl.sample_bytes(out.weights_.capacity(), out.integers_.capacity()));
+  if (!reserve.held()) return no_memory();
   const uint32_t steps = request.steps == 0 ? impl.sampler.steps : request.steps;
   if (steps > kMaxSolverSteps)
     return invalid("steps " + std::to_string(steps) + " are more than " +
