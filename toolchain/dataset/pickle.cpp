@@ -1,5 +1,6 @@
 #include "toolchain/dataset/pickle.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -15,6 +16,9 @@ namespace figurine::dataset {
 namespace {
 
 constexpr size_t kMostValues = 1000;  // on the stack; a number needs two dozen
+constexpr uint32_t kMostNested = 8;   // tuples; a number needs three
+// Bytes and values that are remembered and called back in all: each time twice as many, without it.
+constexpr size_t kMostRemembered = 1 << 20;
 
 enum class Kind : uint8_t {
   kOther,   // None, bool, empty dictionaries: what constructors want and the number does not
@@ -32,10 +36,23 @@ struct Value {
   double number = 0;
   std::string text;
   std::vector<Value> items;
+  uint32_t nested = 0;  // tuples in it, one in the other
 };
 
-Value make(Kind kind, std::string text = {}) { return {kind, 0, std::move(text), {}}; }
-Value make_number(double number) { return {Kind::kNumber, number, {}, {}}; }
+size_t weight(const Value& value) {
+  size_t sum = 1 + value.text.size();
+  for (const Value& item : value.items) sum += weight(item);
+  return sum;
+}
+
+Value make(Kind kind, std::string text = {}) { return {kind, 0, std::move(text), {}, 0}; }
+Value make_number(double number) { return {Kind::kNumber, number, {}, {}, 0}; }
+
+// In one line, whatever it holds.
+std::string shown(std::string text) {
+  for (char& c : text) c = c >= ' ' && c <= '~' ? c : '?';
+  return text.substr(0, 80);
+}
 
 class Machine {
  public:
@@ -91,7 +108,11 @@ class Machine {
   Value tuple(size_t count) {
     Value value = make(Kind::kTuple);
     value.items.resize(count);
-    while (count-- > 0) value.items[count] = pop();
+    while (count-- > 0) {
+      value.items[count] = pop();
+      value.nested = std::max(value.nested, value.items[count].nested + 1);
+    }
+    if (value.nested > kMostNested) fail("is no number");
     return value;
   }
   Value tuple_to_mark() {
@@ -104,12 +125,18 @@ class Machine {
   }
   void put(uint64_t place) {
     if (stack_.empty()) fail("takes from an empty stack");
+    remember(stack_.back());
     memo_[place] = stack_.back();
   }
   void get(uint64_t place) {
     const auto found = memo_.find(place);
     if (found == memo_.end()) fail("remembers what it never saw");
+    remember(found->second);
     push(found->second);
+  }
+  void remember(const Value& value) {
+    remembered_ += weight(value);
+    if (remembered_ > kMostRemembered) fail("is no number");
   }
   double parse(const std::string& text) const {
     char* end = nullptr;
@@ -318,9 +345,7 @@ class Machine {
     for (const char* known : kKnown) {
       if (both == known) return push(make(Kind::kGlobal, both));
     }
-    std::string shown;  // in one line, whatever it holds
-    for (const char c : module + "." + name) shown += c >= ' ' && c <= '~' ? c : '?';
-    fail("asks for " + shown.substr(0, 80) + ", which is never run");
+    fail("asks for " + shown(module + "." + name) + ", which is never run");
   }
 
   void reduce() {
@@ -338,6 +363,7 @@ class Machine {
     if (name == "_frombuffer" && items.size() >= 3 && items[1].kind == Kind::kType) {
       Value array = make(Kind::kArray);
       array.items = {items[1], items[0]};
+      array.nested = arguments.nested;
       return push(std::move(array));
     }
     fail("calls " + name + " for something else than a number");
@@ -350,10 +376,13 @@ class Machine {
     Value& value = stack_.back();
     if (value.kind == Kind::kType && state.items.size() >= 2) {
       const std::string order = state.items[1].text;
+      const size_t letter = value.text.find_first_not_of("<>|=");
+      if (letter == std::string::npos) fail("holds no number");
       if (order == "<" || order == ">" || order == "|")
-        value.text = order + value.text.substr(value.text.find_first_not_of("<>|="));
+        value.text = order + value.text.substr(letter);
     } else if (value.kind == Kind::kArray && state.items.size() == 5) {
       value.items = {state.items[2], state.items[4]};
+      value.nested = state.nested;
     } else {
       fail("builds what is no number");
     }
@@ -371,7 +400,7 @@ class Machine {
     const char kind = type[letter];
     const size_t size = static_cast<size_t>(type[letter + 1] - '0');
     if (type.size() != letter + 2 || (size != 1 && size != 2 && size != 4 && size != 8))
-      fail("holds a number of type " + type.substr(letter, 8) + ", which is not read");
+      fail("holds a number of type " + shown(type.substr(letter, 8)) + ", which is not read");
     if (data.size() != size) fail("holds an array, not one number");
     uint64_t bits = 0;
     for (size_t i = 0; i < size; ++i) {
@@ -397,7 +426,7 @@ class Machine {
 
   std::span<const std::byte> bytes_;
   const std::string& where_;
-  size_t at_ = 0;
+  size_t at_ = 0, remembered_ = 0;
   std::vector<Value> stack_;
   std::map<uint64_t, Value> memo_;
 };

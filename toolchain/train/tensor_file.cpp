@@ -28,19 +28,29 @@ std::string hash_of(std::span<const std::byte> bytes) {
   throw InputError(path + ": " + reason);
 }
 
+// A list of numbers from 0 on; the library would convert others.
+std::vector<uint64_t> read_counts(const nlohmann::json& list) {
+  std::vector<uint64_t> counts;
+  for (const nlohmann::json& entry : list.get<std::vector<nlohmann::json>>())
+    counts.push_back(entry.get_ref<const nlohmann::json::number_unsigned_t&>());
+  return counts;
+}
+
 NamedTensor read_tensor(const std::string& path, const std::string& name,
                         const nlohmann::json& entry, std::span<const std::byte> data) {
-  const std::string field = "tensor " + name;
+  std::string field = "tensor " + name;
+  for (char& c : field) c = c >= ' ' && c <= '~' ? c : '?';  // one line, whatever it is called
   if (entry.at("dtype").get<std::string>() != "F32") fail(path, field + ": dtype is not F32");
-  NamedTensor tensor{.shape = entry.at("shape").get<std::vector<int64_t>>(), .values = {}};
-  const auto offsets = entry.at("data_offsets").get<std::vector<uint64_t>>();
+  NamedTensor tensor;
+  const std::vector<uint64_t> offsets = read_counts(entry.at("data_offsets"));
   if (offsets.size() != 2 || offsets[0] > offsets[1] || offsets[1] > data.size())
     fail(path, field + ": data_offsets are outside the file");
   uint64_t count = 1;
-  for (int64_t side : tensor.shape) {
-    if (side < 0 || (side > 0 && count > data.size() / static_cast<uint64_t>(side)))
+  for (const uint64_t side : read_counts(entry.at("shape"))) {
+    if (side > data.size() || (side > 0 && count > data.size() / side))
       fail(path, field + ": shape is larger than the file");
-    count *= static_cast<uint64_t>(side);
+    count *= side;
+    tensor.shape.push_back(static_cast<int64_t>(side));
   }
   if (count * sizeof(float) != offsets[1] - offsets[0])
     fail(path, field + ": shape and data_offsets contradict each other");
@@ -75,7 +85,10 @@ bool check(const std::string& path, std::span<const std::byte> start,
 
 TensorFile read_tensor_file(const std::string& path) {
   const ports::MappedFile map = value_or_throw(ports::MappedFile::open(path), path);
-  const std::span<const std::byte> bytes = map.bytes();
+  return parse_tensor_file(map.bytes(), path);
+}
+
+TensorFile parse_tensor_file(std::span<const std::byte> bytes, const std::string& path) {
   uint64_t header_bytes = 0;
   if (bytes.size() < sizeof(header_bytes)) fail(path, "too short for a tensor file");
   std::memcpy(&header_bytes, bytes.data(), sizeof(header_bytes));
@@ -83,21 +96,23 @@ TensorFile read_tensor_file(const std::string& path) {
     fail(path, "header length is outside the file");
   const char* text = reinterpret_cast<const char*>(bytes.data()) + sizeof(header_bytes);
   TensorFile file;
+  const std::span<const std::byte> data = bytes.subspan(sizeof(header_bytes) + header_bytes);
+  uint64_t taken = 0;  // tensors that lie on each other could be larger than any memory
   try {
     const nlohmann::json header = nlohmann::json::parse(text, text + header_bytes);
     for (const auto& [name, entry] : header.items()) {
       if (name == "__metadata__") {
         file.metadata = entry.get<std::map<std::string, std::string>>();
       } else {
-        file.tensors[name] =
-            read_tensor(path, name, entry, bytes.subspan(sizeof(header_bytes) + header_bytes));
+        const NamedTensor& tensor = file.tensors[name] = read_tensor(path, name, entry, data);
+        taken += tensor.values.size() * sizeof(float);
+        if (taken > data.size()) fail(path, "tensors are larger together than the file");
       }
     }
   } catch (const nlohmann::json::exception&) {
     fail(path, "header is not a tensor file's JSON");
   }
-  const size_t start_bytes = sizeof(header_bytes) + header_bytes;
-  file.checked = check(path, bytes.first(start_bytes), bytes.subspan(start_bytes), file.metadata);
+  file.checked = check(path, bytes.first(sizeof(header_bytes) + header_bytes), data, file.metadata);
   file.metadata.erase(kChecksum);
   return file;
 }

@@ -11,8 +11,10 @@
 // holds; a byte that changed anywhere in it is found.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,8 @@ struct TensorFile {
 // Throws InputError naming the path: missing, cut off, not this layout, sizes that contradict each
 // other, values that are not finite, a checksum that does not hold.
 TensorFile read_tensor_file(const std::string& path);
+// The same of its bytes; where stands for the path.
+TensorFile parse_tensor_file(std::span<const std::byte> bytes, const std::string& where);
 
 // As read_tensor_file, but a file without a checksum is refused: nothing else tells a sound
 // checkpoint from a damaged one.

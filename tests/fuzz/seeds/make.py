@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Makes the small files of seeds/gaussians anew: every layout that is read, with two Gaussians.
+"""Makes small seeds anew: every layout of Gaussians that is read, with two of them; tensors, pickled
+numbers and poses.
 
     make.py [SPLAT_TRANSFORM]
 
@@ -7,13 +8,15 @@ v4.spz needs zstd, which Python has not: it is written by splat-transform (tests
 from plain.ply, where that command line is given.
 """
 import gzip
+import json
 import pathlib
+import re
 import shlex
 import struct
 import subprocess
 import sys
 
-FOLDER = pathlib.Path(__file__).resolve().parent / "gaussians"
+FOLDER = pathlib.Path(__file__).resolve().parent
 PLAIN = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2",
          "rot_0", "rot_1", "rot_2", "rot_3"]
 ROWS = [[0.5, -0.25, 1, 0.1, 0.2, 0.3, 1, -3, -4, -5, 1, 0, 0, 0],
@@ -44,11 +47,54 @@ def spz(version, degree):
 
 
 def write(name, data):
-    (FOLDER / name).write_bytes(data)
+    """Into the folder of the fuzzer that the name's end says."""
+    (FOLDER / name.rsplit(".")[-1] / name).write_bytes(data)
+
+
+def tensors(data, **entries):
+    """A .safetensors file of these entries: name: [dtype, shape, begin, end]."""
+    header = {"__metadata__": {"kind": "seed"}}
+    for name, (kind, shape, begin, end) in entries.items():
+        header[name] = {"dtype": kind, "shape": shape, "data_offsets": [begin, end]}
+    text = json.dumps(header).encode()
+    return struct.pack("<Q", len(text)) + text + data
+
+
+def write_others():
+    values = struct.pack("<6f", *range(6))
+    seeds = {
+        "safetensors/two": tensors(values, a=["F32", [2, 2], 0, 16], b=["F32", [2], 16, 24]),
+        "safetensors/half": tensors(values, a=["F16", [2], 0, 4]),
+        "safetensors/overlap": tensors(values, a=["F32", [6], 0, 24], b=["F32", [6], 0, 24]),
+        "safetensors/two_lines": tensors(values, **{"a\nb": ["F16", [2], 0, 4]}),
+        "safetensors/negative": tensors(values, a=["F32", [-1], 0, 4], b=["F32", [1e30], 0, 4]),
+        "safetensors/empty": tensors(b"", a=["F32", [0, 3], 0, 0]),
+        "poses/two.json": b'{"root_translation_m": [0, 0.02, 0], '
+                          b'"joints": {"left_elbow": [0.92, 0, 0.39, 0], "neck": [0.2, 0, 0]}}',
+        "poses/root.json": b'{"root_translation_m": [1e3, -2, 0.5]}',
+        "poses/none.json": b'{"joints": {"nekc": [1, 0, 0, 0]}}'}
+    # What a few bytes could make of memory and stack, and texts that are no type's.
+    dtype = b"\x80\x04\x8c\x05numpy\x8c\x05dtype\x93"
+    seeds |= {
+        "camera_scale/doubled": b"\x80\x04)\x94" + b"".join(
+            bytes([0x68, place, 0x68, place, 0x86, 0x94]) for place in range(60)) + b".",
+        "camera_scale/nested": b"\x80\x04)" + 2000 * b"\x85" + b".",
+        "camera_scale/order_alone": dtype + b"\x8c\x01<\x85R(K\x03\x8c\x01<tb.",
+        "camera_scale/two_lines": b"\x80\x04\x8c\x15numpy.core.multiarray\x8c\x06scalar\x93" +
+                                  dtype[2:] + b"\x8c\x04f\n\n9\x85R\x8c\x0812345678\x86R."}
+    # Numbers as Python and NumPy pickle them: those of the reader's test.
+    written = (FOLDER.parents[1] / "toolchain/dataset/pickled_numbers.inc").read_text()
+    for name, lines in re.findall(r'\{"([^"]+)",((?:\s*"[0-9a-f]*")+)', written):
+        if "as NumPy 1" in name:  # one other word
+            continue
+        file = re.sub(r"[^a-z0-9]+", "_", name.lower())
+        seeds[f"camera_scale/{file}"] = bytes.fromhex("".join(re.findall("[0-9a-f]+", lines)))
+    for name, data in seeds.items():
+        (FOLDER / name).write_bytes(data)
 
 
 def main(tool=None):
-    FOLDER.mkdir(exist_ok=True)
+    write_others()
     rest = [f"f_rest_{k}" for k in range(9)]
     write("plain.ply", header("binary_little_endian", [vertex(PLAIN)]) + body(ROWS))
     write("double_big_endian.ply",
@@ -82,7 +128,8 @@ def main(tool=None):
         write(f"bare_v{version}.spz", spz(version, version))
         write(f"v{version}.spz", gzip.compress(spz(version, version), mtime=0))
     if tool:
-        subprocess.run([*shlex.split(tool), "-w", FOLDER / "degree_1.ply", FOLDER / "v4.spz"],
+        subprocess.run([*shlex.split(tool), "-w", FOLDER / "ply/degree_1.ply",
+                        FOLDER / "spz/v4.spz"],
                        check=True, capture_output=True)
 
 

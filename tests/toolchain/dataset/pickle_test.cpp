@@ -43,6 +43,33 @@ TEST(Pickle, RejectsEveryPrefix) {
   }
 }
 
+// What a few bytes could make of a reader's memory and stack, and texts that are no type's.
+TEST(Pickle, RefusesWhatNoNumberNeeds) {
+  std::string doubled = "\x80\x04)\x94";  // an empty tuple, remembered
+  for (char place = 0; place < 60; ++place)
+    doubled += std::string("h") + place + "h" + place + "\x86\x94";  // twice the last, remembered
+  const std::string nested = "\x80\x04)" + std::string(1'000'000, '\x85') + ".",
+                    type =
+                        "\x80\x04\x8c\x05numpy\x8c\x05"
+                        "dtype\x93";
+  const auto text = [](const std::string& of) {
+    return "\x8c" + std::string(1, static_cast<char>(of.size())) + of;
+  };
+  // A type of order marks alone, told its order again; a type with a line break in its name.
+  const std::string marks = type + text("<") + "\x85R(K\x03" + text("<") + "tb.",
+                    lines = "\x80\x04\x8c\x15numpy.core.multiarray\x8c\x06scalar\x93" +
+                            type.substr(2) + text("f\n\n9") + "\x85R" + text("12345678") + "\x86R.";
+  for (const std::string& bytes : {doubled + ".", nested, marks, lines}) {
+    try {
+      read(bytes);
+      ADD_FAILURE() << "is read";
+    } catch (const InputError& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with("scale.pkl: pickle ")) << error.what();
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    }
+  }
+}
+
 // Whatever byte changes: a number or one line, no crash.
 TEST(Pickle, SurvivesEveryChangedByte) {
   for (const Written& written : kWritten) {
