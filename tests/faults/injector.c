@@ -1,7 +1,8 @@
 // LD_PRELOAD layer: the n-th call that changes a file fails.
 //
 //   FAULT_AT=N       which call, from 1; 0 or nothing: none
-//   FAULT_KIND=...   enospc, eio, eintr (write and fsync only), short (a write of one byte)
+//   FAULT_KIND=...   enospc, eio, eintr (write and fsync only), short (a write of one byte), kill
+//                    (SIGKILL in place of the call)
 //   FAULT_COUNT=FILE where the number of calls is written at the end, for a run without a fault
 //
 // Counted are open with O_CREAT, write (on files: not the first three descriptors), fsync, rename,
@@ -10,6 +11,7 @@
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -28,7 +30,9 @@ static int is_kind(const char* kind) {
 // Whether this call is the one.
 static int is_due(void) {
   const char* at = getenv("FAULT_AT");
-  return atomic_fetch_add(&calls, 1) + 1 == (at == NULL ? 0 : atol(at));
+  const int due = atomic_fetch_add(&calls, 1) + 1 == (at == NULL ? 0 : atol(at));
+  if (due && is_kind("kill")) raise(SIGKILL);
+  return due;
 }
 
 static int fails(int may_be_interrupted) {

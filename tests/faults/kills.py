@@ -262,8 +262,10 @@ def write(arguments, rows):
     done = ",".join(dict.fromkeys(row["program"] for row in rows))
     command = f"tests/faults/kills.py --each {arguments.each} --seed {arguments.seed} " \
               f"--programs {done}"
-    results.write(pathlib.Path(arguments.output), {
-        **results.head(command), "machine": machine(), **totals_of(rows), "rows": rows})
+    path = pathlib.Path(arguments.output)
+    injected = (results.read(path) or {}).get("injected")  # of injected.py
+    results.write(path, {**results.head(command), "machine": machine(), **totals_of(rows),
+                         "rows": rows, **({"injected": injected} if injected else {})})
 
 
 def main():
