@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Makes small seeds anew: every layout of Gaussians that is read, with two of them; tensors, pickled
-numbers and poses.
+"""Makes small seeds anew: every layout of Gaussians that is read, with two of them; tensors,
+pickled numbers and poses.
 
     make.py [SPLAT_TRANSFORM]
 
