@@ -75,6 +75,7 @@ Result<std::string> value_of(const std::string& header, const std::string& key,
                      : open == '\'' ? header.find('\'', start + 1)
                                     : header.find_first_of(",}", start) - 1;
   if (end >= header.size()) return corrupt(where + ": header: " + key + " does not end");
+  if (end < start) return corrupt(where + ": header: " + key + " is empty");
   return header.substr(start, end - start + 1);
 }
 

@@ -160,7 +160,7 @@ class Target:
             ours = [match.group(1) for match in re.finditer(
                 r"#\d+ 0x\w+ in .*? (\S+:\d+)(?::\d+)?$", result.stderr, re.MULTILINE)
                     if str(REPOSITORY) in match.group(1) and "_fuzz." not in match.group(1)]
-            lines = [line[len(str(REPOSITORY)) + 1:] for line in ours[:3]]
+            lines = [line.rpartition(f"{REPOSITORY}/")[2] for line in ours[:3]]
             error = re.search(r"(runtime error|ERROR|SUMMARY): .*", result.stderr)
             return " < ".join(lines) or (error.group(0)[:120] if error else "trap")
         return None

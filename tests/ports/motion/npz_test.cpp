@@ -39,6 +39,10 @@ TEST(Npy, EveryPrefixAndSurplusIsRefused) {
     changed.replace(changed.find("(3,2,)"), 6, shape);
     EXPECT_FALSE(parse_npy(bytes_of(changed), "a").ok()) << shape;
   }
+  // Found by fuzzing: a value that ends before it begins.
+  std::string without = sound;
+  without.replace(without.find("(3,2,)"), 6, ",");
+  EXPECT_EQ(parse_npy(bytes_of(without), "a").status().message(), "a: header: shape is empty");
   // Any single changed byte of the header either still describes the same array or is refused;
   // nothing else happens.
   for (size_t i = 0; i < 128; ++i) {
