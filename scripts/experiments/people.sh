@@ -9,7 +9,10 @@ mkdir -p "$folder/runs"
 
 body=$folder/body.fgn
 body_options=(--atlas weighted --weight hands=5.5 --weight head=5.5)
-[ -e "$body" ] || { step "body"; train body --makehuman --uv "${uv:-128}" "${body_options[@]}" -o "$body"; }
+[ -e "$body" ] || {
+  step "body"
+  train body --makehuman --uv "${uv:-128}" "${body_options[@]}" -o "$body"
+}
 
 motions=()
 motion() {  # NAME CLIP OPTIONS...

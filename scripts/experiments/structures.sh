@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What a population's members should be made of: one network that LEARNERS people share, and what
-# somebody new changes of it. Everybody is trained in each of these ways, all from the shared network
-# and the learners' mean static map, but for the first:
+# somebody new changes of it. Everybody is trained in each of these ways, all from the shared
+# network and the learners' mean static map, but for the first:
 #
 #   scratch      everything, from the common random weights (edge alone)
 #   free         everything
@@ -10,9 +10,9 @@
 #   scale_R      and the network's kernels by products with 1 + A B, half of A drawn once for all
 #   basis_R      and the network's kernels by A S, whose S is everybody's
 #
-# At `edge` PEOPLE new people say what each way costs in pictures. At `nano` the learners are trained
-# in each way too, so that a way is a population: how much of the new people the learners span, how
-# many bytes it has, and what a small sampler makes of it.
+# At `edge` PEOPLE new people say what each way costs in pictures. At `nano` the learners are
+# trained in each way too, so that a way is a population: how much of the new people the learners
+# span, how many bytes it has, and what a small sampler makes of it.
 #
 # Writes its scale's part of docs/results/structures.json.
 #
@@ -20,8 +20,8 @@
 #
 # FOLDER (default out/structures) keeps every step: run it again and it goes on where it stopped.
 #
-# Environment: LEARNERS (12 at edge, 60 at nano), PEOPLE (6, 15), ITERATIONS of a person (1000, 600),
-# SAMPLER_ITERATIONS (1500). On two quiet cores forty minutes each.
+# Environment: LEARNERS (12 at edge, 60 at nano), PEOPLE (6, 15), ITERATIONS of a person (1000,
+# 600), SAMPLER_ITERATIONS (1500). On two quiet cores forty minutes each.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
@@ -138,7 +138,8 @@ if [ "$scale" = nano ]; then
   [ -e "$folder/shared.fgn" ] ||
     train pack "$shared/000000" --body "$body" -o "$folder/shared.fgn" > /dev/null
   pack_one() {  # RUN PACKAGE OPTIONS...
-    [ -e "$2" ] || train pack "$1" --name "$(basename "$1")" --threads 1 "${@:3}" -o "$2" > /dev/null
+    [ -e "$2" ] ||
+      train pack "$1" --name "$(basename "$1")" --threads 1 "${@:3}" -o "$2" > /dev/null
   }
   for ways in free map scale_4 basis_8; do
     step "$ways: a population"

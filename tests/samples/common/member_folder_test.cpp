@@ -39,8 +39,8 @@ class MemberFolder : public testing::Test {
                                     .name = name});
   }
   void save(const std::string& name, const tests::AlignedBytes& bytes) const {
-    folder_.write(name, {reinterpret_cast<const char*>(bytes.bytes().data()),
-                         bytes.bytes().size()});
+    folder_.write(name,
+                  {reinterpret_cast<const char*>(bytes.bytes().data()), bytes.bytes().size()});
   }
   std::string error_of(const std::string& name) const {
     const auto loaded = load_avatar(folder_.path(name));
@@ -125,9 +125,8 @@ TEST_F(MemberFolder, SaysWhatIsWrongInALine) {
 }
 
 TEST_F(MemberFolder, IsDrawnByTheProgram) {
-  const tests::ProgramRun run =
-      tests::run_figurine("render " + folder_.path("people#bob") + " --size 48x48 -o " +
-                          folder_.path("bob.png"));
+  const tests::ProgramRun run = tests::run_figurine("render " + folder_.path("people#bob") +
+                                                    " --size 48x48 -o " + folder_.path("bob.png"));
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_TRUE(folder_.has("bob.png"));
 }
