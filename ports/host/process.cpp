@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdarg>
 #include <cstdio>
 #include <cstring>
 #include <string>
@@ -16,15 +17,15 @@ namespace {
 
 const char* program_name = "figurine";
 
-void say(const char* text) {
+void write_from_handler(const char* text) {
   if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;  // nobody is left to tell
 }
 
 // Only what a signal handler may do.
 void end_of_cut_file(int signal, siginfo_t* info, void*) {
   if (info->si_code == BUS_ADRERR) {
-    say(program_name);
-    say(": an input file became shorter, or its disk failed, while it was read\n");
+    write_from_handler(program_name);
+    write_from_handler(": an input file became shorter, or its disk failed, while it was read\n");
     ::_exit(1);
   }
   ::signal(signal, SIG_DFL);
@@ -46,6 +47,17 @@ void prepare_process(const char* program) {
   action.sa_sigaction = end_of_cut_file;
   action.sa_flags = SA_SIGINFO;
   ::sigaction(SIGBUS, &action, nullptr);
+}
+
+void say(const std::string& line) { std::fprintf(stderr, "%s: %s\n", program_name, line.c_str()); }
+
+void sayf(const char* format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  char line[2048];
+  std::vsnprintf(line, sizeof(line), format, arguments);
+  va_end(arguments);
+  say(line);
 }
 
 Status flush_standard_output() {

@@ -31,8 +31,8 @@ Result<T> number(const std::string& text, T least, T most, const char* bounds) {
 }
 
 template <class T, class Slot>
-ImportOption number_option(const char* name, const char* help, T least, T most, const char* bounds,
-                           Slot& slot) {
+TextOption number_option(const char* name, const char* help, T least, T most, const char* bounds,
+                         Slot& slot) {
   return {name, help, false, [=, &slot](const std::string& text) -> Status {
             const Result<T> value = number<T>(text, least, most, bounds);
             if (!value.ok()) return value.status();
@@ -41,7 +41,7 @@ ImportOption number_option(const char* name, const char* help, T least, T most, 
           }};
 }
 
-ImportOption text_option(const char* name, const char* help, std::string& slot) {
+TextOption text_option(const char* name, const char* help, std::string& slot) {
   return {name, help, false, [&slot](const std::string& text) -> Status {
             if (text.empty()) return wrong("empty");
             slot = text;
@@ -49,7 +49,7 @@ ImportOption text_option(const char* name, const char* help, std::string& slot) 
           }};
 }
 
-ImportOption flag(const char* name, const char* help, bool& slot, bool value) {
+TextOption flag(const char* name, const char* help, bool& slot, bool value) {
   return {name, help, true, [&slot, value](const std::string&) -> Status {
             slot = value;
             return {};
@@ -100,9 +100,9 @@ std::string figures(const RetargetReport& report, const MotionClip& clip) {
 
 }  // namespace
 
-std::vector<ImportOption> import_options(ImportSettings& settings) {
+std::vector<TextOption> import_options(ImportSettings& settings) {
   RetargetOptions& retarget = settings.retarget;
-  std::vector<ImportOption> options;
+  std::vector<TextOption> options;
   options.push_back(number_option<float>("--fps", "Frames a second of the result; default: 30", 1,
                                          240, "a number from 1 to 240",
                                          retarget.frames_per_second));

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "figurine/body.h"
 #include "figurine/package.h"
 #include "figurine/status.h"
+#include "ports/host/text_option.h"
 #include "ports/motion/motion_clip.h"
 #include "ports/motion/retarget.h"
 
@@ -28,16 +28,8 @@ struct ImportSettings {
   std::optional<float> head_pitch_deg;
 };
 
-// An option of the commands. `set` takes the text behind it ("" for a flag) and says what is wrong
-// with it.
-struct ImportOption {
-  const char* name;  // "--fps"
-  const char* help;
-  bool is_flag = false;
-  std::function<Status(const std::string& text)> set;
-};
-// All of them; they hold on to the settings.
-std::vector<ImportOption> import_options(ImportSettings& settings);
+// The options of the commands; they hold on to the settings.
+std::vector<TextOption> import_options(ImportSettings& settings);
 
 struct ImportedMotion {
   MotionClip clip;

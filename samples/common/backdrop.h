@@ -11,8 +11,8 @@
 #include <string>
 #include <thread>
 
+#include "ports/host/process.h"
 #include "ports/v4l2/v4l2_capture.h"
-#include "samples/common/pose_feed.h"
 #include "samples/common/rendered_frame.h"
 
 namespace figurine::samples {
@@ -22,7 +22,7 @@ class Backdrop {
   struct Options {
     ImageSize size;  // of the frames
     double frames_per_second = 30;
-    void (*say)(const std::string& line) = samples::say;
+    void (*say)(const std::string& line) = ports::say;
     ports::VideoSystem* system = nullptr;  // null: the machine's own
   };
   // Errors: V4l2Capture::open.

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "ports/host/clock.h"
-#include "samples/common/pose_feed.h"
+#include "ports/host/process.h"
 #include "samples/common/progress.h"
 #include "samples/common/v4l2_sink.h"
 #include "samples/common/window_sink.h"
@@ -53,7 +53,7 @@ Result<int> open_stream(const std::string& name) {
     if (descriptor >= 0) return descriptor;
     if (errno != ENXIO && errno != EINTR)
       return Status(StatusCode::kIo, name + ": cannot be written: " + std::strerror(errno));
-    if (!std::exchange(said, true)) say(name + ": waiting for a reader");
+    if (!std::exchange(said, true)) ports::say(name + ": waiting for a reader");
     FIG_RETURN_IF_ERROR(check_interrupt());
     ports::sleep_until(ports::now_ns() + kAsk_ns);
   }

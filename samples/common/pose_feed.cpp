@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
@@ -17,8 +16,6 @@ constexpr uint64_t kMostSaid = 10;  // malformed lines
 constexpr int kLook_ms = 100;       // how soon the thread sees that it shall end
 
 }  // namespace
-
-void say(const std::string& line) { std::fprintf(stderr, "figurine: %s\n", line.c_str()); }
 
 class LineFeed::Source final : public PoseSource {
  public:

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "figurine/body.h"
+#include "ports/host/process.h"
 #include "samples/common/pose_json.h"
 #include "samples/common/pose_source.h"
 
@@ -47,9 +48,6 @@ class PoseFeed {
   PoseFeed() = default;
 };
 
-// A line on standard error: what a feed has to say while it runs.
-void say(const std::string& line);
-
 // Lines of JSON (pose_json.h) from a descriptor, each a whole pose for every figure. A line that is
 // no pose is counted and said, the first ten of them, and the pose before it stays; a line of
 // nothing but blanks is none.
@@ -59,7 +57,7 @@ class LineFeed final : public PoseFeed {
   struct Options {
     int descriptor = 0;  // the caller's to close
     std::string name = "standard input";
-    void (*say)(const std::string& line) = samples::say;
+    void (*say)(const std::string& line) = ports::say;
     uint64_t (*now_ns)();  // of arrivals
   };
   explicit LineFeed(const Options& options) : options_(options) {}

@@ -45,8 +45,4 @@ Result<StoredPose> load_pose_json(const std::string& path,
 // as names to edit. The counts must agree (FIG_CHECK).
 std::string write_pose_json(const PoseView& pose, std::span<const std::string> joint_names);
 
-// Up to three of the names that a misspelt one may have meant, the likeliest first: by the number
-// of letters to change, add, leave out or swap with a neighbour. Empty where none is near.
-std::vector<std::string> nearest_names(std::string_view name, std::span<const std::string> names);
-
 }  // namespace figurine::samples

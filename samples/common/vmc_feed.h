@@ -13,7 +13,7 @@ class VmcFeed final : public PoseFeed {
  public:
   struct Options {
     ports::VmcState::Options state;
-    void (*say)(const std::string& line) = samples::say;
+    void (*say)(const std::string& line) = ports::say;
     uint64_t (*now_ns)();  // of arrivals
   };
   // Binds, and says where. Errors: UdpReceiver::open.

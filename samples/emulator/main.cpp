@@ -1,13 +1,14 @@
 // figurine-emulator: what a device would show, at a desk (docs/emulator.md).
 //
-// Exit codes as figurine's: 0 done, 1 bad input, 2 usage, 3 a bug. A file that is wrong is a line
-// in the window, and no end.
+// Ends as all programs do (docs/command_line.md). A file that is wrong is a line in the window, and
+// no end.
 #include <CLI/CLI.hpp>
-#include <cstdio>
-#include <exception>
 #include <fstream>
 #include <sstream>
 
+#include "ports/command_line/command_line.h"
+#include "ports/command_line/values.h"
+#include "ports/host/process.h"
 #include "samples/common/device_options.h"
 #include "samples/common/parse.h"
 #include "samples/common/progress.h"
@@ -61,47 +62,39 @@ Status run(const EmulatorOptions& options) {
   return (*app)->run(**session, std::move(*script));
 }
 
+int run(int argc, char** argv) {
+  CLI::App app{"figurine-emulator: what a device would show, at a desk", "figurine-emulator"};
+  app.set_version_flag("--version", "figurine-emulator " FIGURINE_VERSION);
+  ports::prepare_help(app);
+  EmulatorOptions options;
+  app.add_option("files", options.files,
+                 "avatars, a motion, a sampler (.fgn), a file of Gaussians (.ply, .splat, .spz)");
+  app.add_option("--script", options.script, "commands to carry out (docs/emulator.md)");
+  std::vector<std::string> profiles;
+  for (const DeviceProfile& each : device_profiles()) profiles.push_back(each.name);
+  app.add_option("--profile", options.profile, "which device")
+      ->check(ports::one_of(profiles))
+      ->capture_default_str();
+  app.add_option("--size", options.size, "WIDTHxHEIGHT of the window")->capture_default_str();
+  samples::add_background_option(app, options.background, true, options.background);
+  app.add_option("--letters", options.letters_px, "height of the window's text in pixels")
+      ->check(ports::between(8.0, 64.0))
+      ->capture_default_str();
+  options.device.add_to(app, {.json = true});
+  if (const std::optional<int> code = ports::parse_command_line(app, argc, argv)) return *code;
+  samples::catch_interrupts();
+  const Status status = run(options);
+  if (status.ok()) return ports::kDone;
+  ports::say(status.message());
+  if (status.code() == StatusCode::kInterrupted) samples::die_of_interrupt();
+  return ports::kBadInput;
+}
+
 }  // namespace
 
 }  // namespace figurine::emulator
 
 int main(int argc, char** argv) {
-  using namespace figurine;
-  CLI::App app{"figurine-emulator: what a device would show, at a desk"};
-  app.set_version_flag("--version", "figurine " FIGURINE_VERSION);
-  emulator::EmulatorOptions options;
-  app.add_option("files", options.files,
-                 "avatars, a motion, a sampler (.fgn), a file of Gaussians (.ply, .splat, .spz)");
-  app.add_option("--script", options.script, "commands to carry out (docs/emulator.md)");
-  std::string profiles;
-  for (const emulator::DeviceProfile& each : emulator::device_profiles())
-    profiles += (profiles.empty() ? "" : ", ") + std::string(each.name);
-  app.add_option("--profile", options.profile, "which device: " + profiles)->capture_default_str();
-  app.add_option("--size", options.size, "WIDTHxHEIGHT of the window")->capture_default_str();
-  app.add_option("--background", options.background, "behind the figures, as for figurine render")
-      ->capture_default_str();
-  app.add_option("--letters", options.letters_px, "height of the window's text in pixels")
-      ->check(CLI::Range(8.0f, 64.0f))
-      ->capture_default_str();
-  options.device.add_to(app, false);
-  try {
-    app.parse(argc, argv);
-    samples::catch_interrupts();
-    const Status status = emulator::run(options);
-    if (status.ok()) return 0;
-    std::fprintf(stderr, "figurine-emulator: %s\n", status.message().c_str());
-    if (status.code() == StatusCode::kInterrupted) samples::die_of_interrupt();
-    return 1;
-  } catch (const CLI::Success& success) {  // --help, --version
-    return app.exit(success);
-  } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "figurine-emulator: %s (figurine-emulator --help)\n", error.what());
-    return 2;
-  } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "figurine-emulator: out of memory\n");
-    return 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "figurine-emulator: internal error: %s\n", error.what());
-    return 3;
-  }
+  return figurine::ports::run_program("figurine-emulator",
+                                      [&] { return figurine::emulator::run(argc, argv); });
 }

@@ -13,8 +13,8 @@
 #include <set>
 #include <utility>
 
+#include "ports/command_line/values.h"
 #include "ports/host/clock.h"
-#include "ports/host/files.h"
 #include "samples/common/deadlines.h"
 #include "samples/common/device_options.h"
 #include "samples/common/machine.h"
@@ -31,7 +31,8 @@ constexpr uint32_t kWarmUpFrames = 3;
 struct BenchOptions {
   BenchSubject subject;
   DeviceOptions device;
-  std::string size, json, camera, framing = "body", roofline;
+  ViewOptions view;
+  std::string roofline;
   double hz = 0;  // 0: as fast as it goes
 };
 
@@ -168,21 +169,13 @@ Result<BenchSubject> subject_of(const BenchOptions& options) {
     subject.ply = inputs[0];
     inputs.clear();
   }
-  if (!options.size.empty()) {
-    const Result<ImageSize> size = parse_size(options.size);
-    if (!size.ok()) return size.status();
-    subject.size = *size;
-  }
-  const Result<Framing> framing = parse_framing(options.framing);
-  if (!framing.ok()) return framing.status();
-  subject.framing = *framing;
-  if (!options.camera.empty()) {
-    const Result<CameraSpec> camera = parse_camera_spec(options.camera);
-    if (!camera.ok()) return camera.status();
-    if (!subject.ply.empty())
-      return Status(StatusCode::kInvalidArgument, subject.ply + ": is turned, without --camera");
-    subject.camera = *camera;
-  }
+  Result<CameraPathOptions> path = options.view.camera_path();
+  if (!path.ok()) return path.status();
+  if (!options.view.camera.empty() && !subject.ply.empty())
+    return Status(StatusCode::kInvalidArgument, subject.ply + ": is turned, without --camera");
+  subject.size = path->size;
+  subject.framing = path->framing;
+  subject.camera = std::move(path->camera);
   return subject;
 }
 
@@ -299,15 +292,8 @@ Status run_bench(BenchOptions options) {
   json["peak_memory_bytes"] = peak_bytes;
   if (!paced.is_null()) json["paced"] = std::move(paced);
   json["runs"] = std::move(runs);
-  if (options.json == "-") {
-    print_json(json);
-    return {};
-  }
-  print_table(json);
-  if (options.json.empty()) return {};
-  const std::string text =
-      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-  return ports::write_file_atomically(options.json, std::as_bytes(std::span(text)));
+  if (options.device.json != "-") print_table(json);
+  return write_json(options.device.json, json);
 }
 
 }  // namespace
@@ -322,42 +308,26 @@ Command add_bench_command(CLI::App& app) {
                    "people.fgn#17), side by side; or one file of Gaussians (.ply), turned once "
                    "around")
       ->required();
-  command->add_option("--body", subject.scene.body,
-                      "body package; default: found by content hash beside the avatar, in "
-                      "FIGURINE_PATH, in the folders beside");
-  command
-      ->add_option("--motion", subject.scene.motions,
-                   "motion package; default: the golden pose, swaying")
-      ->expected(1);
+  add_body_option(*command, subject.scene.body);
+  add_motion_option(*command, subject.scene.motions, "the golden pose, swaying");
   command->add_option("--frames", subject.frames, "measured frames")
-      ->check(CLI::Range(1u, 100000u))
+      ->check(ports::between(1, 100000))
       ->capture_default_str();
   command
       ->add_option("--hz", options->hz,
                    "begin frames at ticks of this rate and count those that end after the next "
                    "tick; one precision, one number of threads; default: as fast as it goes")
-      ->check(CLI::Range(1.0, 1000.0));
+      ->check(ports::between(1.0, 1000.0));
   command->add_option("--roofline", options->roofline,
                       "what this machine can do at most, by tests/bench/roofline: prints every "
                       "stage's share of it");
-  command->add_option("--size", options->size,
-                      "WIDTHxHEIGHT; default: the golden frame's, or 1024x768");
-  add_crowd_options(*command, subject.scene);
-  command->add_option("--camera", options->camera,
-                      "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
-  command->add_option("--spacing", subject.scene.spacing_m, "metres between figures")
-      ->check(CLI::Range(-1000.0f, 1000.0f))
+  options->view.add_still_to(*command);
+  add_place_options(*command, subject.scene, false);
+  command->add_option("--up", subject.up, "which axis of a .ply file points up")
+      ->check(ports::one_of(kUpAxes))
       ->capture_default_str();
-  command->add_option("--framing", options->framing, "body, bust or head")
-      ->check(CLI::IsMember({"body", "bust", "head"}))
-      ->capture_default_str();
-  command->add_option("--up", subject.up, "which axis of a .ply file points up: +y, -y, +z or -z")
-      ->check(CLI::IsMember(kUpAxes))
-      ->capture_default_str();
-  options->device.add_to(*command, false);
+  options->device.add_to(*command);
   subject.omissions.add_to(*command);
-  command->add_option("--json", options->json,
-                      "write the figures to this file; - prints them instead of the table");
   return {command, [options] { return run_bench(*options); }};
 }
 

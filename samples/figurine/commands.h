@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include "figurine/status.h"
 
@@ -27,5 +28,8 @@ Command add_pose_command(CLI::App& app);
 Command add_bench_command(CLI::App& app);
 Command add_report_command(CLI::App& app);
 Command add_selftest_command(CLI::App& app);
+
+// All of them, and what the program itself has.
+std::vector<Command> add_commands(CLI::App& app);
 
 }  // namespace figurine::samples

@@ -1,13 +1,14 @@
 // figurine export: an avatar in one pose, or any file of 3D Gaussians that is read, as a plain .ply
 // for any standard viewer.
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "ports/command_line/values.h"
 #include "ports/gaussians/gaussian_file.h"
 #include "ports/gaussians/ply.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "samples/common/device_options.h"
 #include "samples/common/gaussian_scene.h"
 #include "samples/common/scene.h"
@@ -47,8 +48,8 @@ Status export_gaussians(const ExportOptions& options) {
       cloud->view(),
       {.comments = comments_of(cloud->antialiased, cloud->up), .origin_m = cloud->origin_m});
   FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.output, bytes));
-  std::fprintf(stderr, "figurine: %s: %s\n", input.c_str(), ports::describe(*cloud).c_str());
-  if (options.device.json) {
+  ports::say(input + ": " + ports::describe(*cloud));
+  if (!options.device.json.empty()) {
     nlohmann::ordered_json json = json_header("export");
     json["scene"] = input;
     json["output"] = options.output;
@@ -60,7 +61,7 @@ Status export_gaussians(const ExportOptions& options) {
     json["up"] = to_string(cloud->up_axis());
     json["origin"] = cloud->origin_m;
     json["size_bytes"] = bytes.size();
-    print_json(json);
+    return write_json(options.device.json, json);
   }
   return {};
 }
@@ -90,9 +91,10 @@ Status run_export(const ExportOptions& options) {
   const std::vector<std::byte> bytes = ports::write_gaussian_ply(
       *gaussians, {.comments = comments_of(antialiased, ports::UpAxis::kPlusY)});
   FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.output, bytes));
-  std::fprintf(stderr, "figurine: %s: %u Gaussians of degree %u%s, up +y\n", options.output.c_str(),
-               gaussians->count, gaussians->sh_degree, antialiased ? ", antialiased" : "");
-  if (options.device.json) {
+  ports::say(options.output + ": " + std::to_string(gaussians->count) + " Gaussians of degree " +
+             std::to_string(gaussians->sh_degree) + (antialiased ? ", antialiased" : "") +
+             ", up +y");
+  if (!options.device.json.empty()) {
     nlohmann::ordered_json json = json_header("export");
     json["avatar"] = options.scene.avatars[0];
     json["output"] = options.output;
@@ -102,7 +104,7 @@ Status run_export(const ExportOptions& options) {
     json["sh_degree"] = gaussians->sh_degree;
     json["antialiased"] = antialiased;
     json["size_bytes"] = bytes.size();
-    print_json(json);
+    return write_json(options.device.json, json);
   }
   return {};
 }
@@ -120,18 +122,14 @@ Command add_export_command(CLI::App& app) {
           "avatar package (.fgn), a member of a population (people.fgn#NAME, people.fgn#17), or "
           "a file of Gaussians (.ply, .splat, .spz)")
       ->required();
-  command->add_option("--body", options->scene.body,
-                      "body package; default: found by content hash beside the avatar, in "
-                      "FIGURINE_PATH, in the folders beside");
-  command
-      ->add_option("--motion", options->scene.motions, "motion package; default: the golden pose")
-      ->expected(1);
+  add_body_option(*command, options->scene.body);
+  add_motion_option(*command, options->scene.motions, "the golden pose");
   command
       ->add_option("--pose", options->scene.poses,
                    "pose file (.json, docs/poses.md) in place of a motion")
       ->expected(1);
   command->add_option("--frame", options->frame, "of the motion")
-      ->check(CLI::Range(0u, UINT32_MAX - 1))
+      ->check(ports::between(0, UINT32_MAX - 1))
       ->capture_default_str();
   command->add_option("-o,--output", options->output, "x.ply")->required();
   options->device.add_to(*command);

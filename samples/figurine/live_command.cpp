@@ -7,8 +7,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "ports/command_line/values.h"
 #include "ports/host/clock.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "samples/common/camera_path.h"
 #include "samples/common/device_options.h"
 #include "samples/common/live_output.h"
@@ -25,9 +27,8 @@ struct LiveOptions {
   SceneOptions scene;
   DeviceOptions device;
   OmissionOptions omissions;
-  std::string pose, output, camera, size, background = "#dbe0e6", follow = "smooth",
-                                          framing = "body", behind, json;
-  std::optional<float> near_m;
+  ViewOptions view;
+  std::string pose, output, background = "#dbe0e6", behind;
   double frames_per_second = 30;
   std::optional<uint64_t> frames;
   std::optional<double> seconds;
@@ -59,7 +60,7 @@ Result<Plan> make_plan(const LiveOptions& options) {
   };
   Plan plan;
   FIG_RETURN_IF_ERROR(LiveOutput::check(options.output));
-  if (options.output == "-" && options.json == "-")
+  if (options.output == "-" && options.device.json == "-")
     return invalid("live: -o - and --json - cannot both have standard output");
   if (is_vmc(options.pose)) {
     const Result<ports::UdpAddress> address = ports::parse_vmc_address(options.pose);
@@ -74,20 +75,9 @@ Result<Plan> make_plan(const LiveOptions& options) {
         "#00b140");
   }
   plan.background = *background->colour;
-  plan.camera_path = {.follow = options.follow == "smooth", .near_m = options.near_m};
-  if (!options.size.empty()) {
-    const Result<ImageSize> size = parse_size(options.size);
-    if (!size.ok()) return size.status();
-    plan.camera_path.size = *size;
-  }
-  const Result<Framing> framing = parse_framing(options.framing);
-  if (!framing.ok()) return framing.status();
-  plan.camera_path.framing = *framing;
-  if (!options.camera.empty()) {
-    const Result<CameraSpec> camera = parse_camera_spec(options.camera);
-    if (!camera.ok()) return camera.status();
-    plan.camera_path.camera = *camera;
-  }
+  Result<CameraPathOptions> camera_path = options.view.camera_path();
+  if (!camera_path.ok()) return camera_path.status();
+  plan.camera_path = std::move(*camera_path);
   plan.ticks = options.frames;
   if (options.seconds) {
     plan.ticks = static_cast<uint64_t>(
@@ -161,16 +151,6 @@ nlohmann::ordered_json describe(const LiveOptions& options, const LiveRun& run,
   return json;
 }
 
-Status write_json(const std::string& path, const nlohmann::ordered_json& json) {
-  if (path == "-") {
-    print_json(json);
-    return {};
-  }
-  const std::string text =
-      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-  return ports::write_file_atomically(path, std::as_bytes(std::span(text)));
-}
-
 void print_summary(const LiveRun& run, const LiveLoop& loop) {
   char text[256];
   std::snprintf(text, sizeof(text),
@@ -179,7 +159,7 @@ void print_summary(const LiveRun& run, const LiveLoop& loop) {
                 static_cast<unsigned long long>(loop.sink.counts().shown),
                 static_cast<unsigned long long>(loop.sink.counts().dropped), run.seconds,
                 run.latency.percentile_ms(50), run.latency.percentile_ms(99));
-  say(text + (loop.feed == nullptr ? "" : "; " + loop.feed->summary()));
+  ports::say(text + (loop.feed == nullptr ? "" : "; " + loop.feed->summary()));
 }
 
 Status run_live_command(LiveOptions options) {
@@ -240,8 +220,7 @@ Status run_live_command(LiveOptions options) {
   // An interrupt is how most runs end: what was shown stays.
   const Status finished = run.end == LiveEnd::kError ? Status() : output->finish();
   print_summary(run, loop);
-  if (!options.json.empty())
-    FIG_RETURN_IF_ERROR(write_json(options.json, describe(options, run, loop)));
+  FIG_RETURN_IF_ERROR(write_json(options.device.json, describe(options, run, loop)));
   if (run.end == LiveEnd::kInterrupt)
     return finished.ok() ? Status(StatusCode::kInterrupted, "live: stopped by a signal") : finished;
   return run.status.ok() ? finished : run.status;
@@ -253,14 +232,8 @@ Command add_live_command(CLI::App& app) {
   auto options = std::make_shared<LiveOptions>();
   CLI::App* command = app.add_subcommand(
       "live", "Shows avatars in a stream, posed as it goes, until told otherwise");
-  command
-      ->add_option(
-          "avatars", options->scene.avatars,
-          "avatar packages (.fgn), or members of populations (people.fgn#NAME, people.fgn#17)")
-      ->required();
-  command->add_option("--body", options->scene.body,
-                      "body package; default: found by content hash beside the avatar, in "
-                      "FIGURINE_PATH, in the folders beside");
+  add_avatars_argument(*command, options->scene.avatars);
+  add_body_option(*command, options->scene.body);
   command
       ->add_option("--pose", options->pose,
                    "a motion (.fgn), again and again; a pose file (.json); vmc://:39539, a "
@@ -273,50 +246,21 @@ Command add_live_command(CLI::App& app) {
           "x.y4m (docs/live.md)")
       ->required();
   command->add_option("--fps", options->frames_per_second, "frames a second")
-      ->check(CLI::Range(1.0, 240.0))
+      ->check(ports::between(1.0, 240.0))
       ->capture_default_str();
   CLI::Option* frames =
       command->add_option("--frames", options->frames, "end after so many, dropped ones counted")
-          ->check(CLI::Range(uint64_t{1}, uint64_t{1} << 40));
+          ->check(ports::between(1, uint64_t{1} << 40));
   command->add_option("--seconds", options->seconds, "end after so many")
-      ->check(CLI::Range(0.001, 1e8))
+      ->check(ports::between(0.001, 1e8))
       ->excludes(frames);
-  command
-      ->add_option("--place", options->scene.places,
-                   "X,Z[,HEADING] in metres and degrees, once for each avatar")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--spacing", options->scene.spacing_m, "metres between avatars side by side")
-      ->check(CLI::Range(-1000.0f, 1000.0f))
-      ->capture_default_str();
-  add_crowd_options(*command, options->scene);
-  command->add_option("--camera", options->camera,
-                      "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
-  command
-      ->add_option("--framing", options->framing,
-                   "what of the figures the picture holds: body, bust (head and shoulders) or head")
-      ->check(CLI::IsMember({"body", "bust", "head"}))
-      ->capture_default_str();
-  command
-      ->add_option("--follow", options->follow,
-                   "whether an orbit goes along with the figures: smooth or off")
-      ->check(CLI::IsMember({"smooth", "off"}))
-      ->capture_default_str();
-  command
-      ->add_option("--near", options->near_m,
-                   "metres; Gaussians nearer than this are culled; default 0.2")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--size", options->size,
-                      "WIDTHxHEIGHT; default: the camera's, or the avatar's golden frame's");
-  command
-      ->add_option("--background", options->background,
-                   "black, grey, white, #RRGGBB or R,G,B; #00b140 for a chroma key")
-      ->capture_default_str();
+  add_place_options(*command, options->scene);
+  options->view.add_to(*command);
+  add_background_option(*command, options->background, false, options->background);
   command->add_option("--behind", options->behind,
                       "/dev/videoN, a camera whose picture stands behind the figures in place of "
                       "the background, cut to the frame's shape");
-  command->add_option("--json", options->json, "summary as JSON to this file (- for stdout)");
-  options->device.add_to(*command, false);
+  options->device.add_to(*command);
   options->omissions.add_to(*command);
   return {command, [options] { return run_live_command(*options); }};
 }

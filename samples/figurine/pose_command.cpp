@@ -4,6 +4,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "ports/command_line/command_line.h"
+#include "ports/command_line/values.h"
 #include "ports/host/files.h"
 #include "samples/common/device_options.h"
 #include "samples/common/loading.h"
@@ -15,9 +17,8 @@ namespace figurine::samples {
 namespace {
 
 struct PoseOptions {
-  std::string from, output;
+  std::string from, output, json;
   uint32_t frame = 0;
-  bool json = false;
 };
 
 Status run_pose(const PoseOptions& options) {
@@ -32,21 +33,17 @@ Status run_pose(const PoseOptions& options) {
   }
   const std::string text = write_pose_json(motion.pose(options.frame), motion.joint_names);
   if (options.output.empty()) {
-    if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0)
-      return Status(StatusCode::kIo, "standard output: cannot be written");
+    std::fputs(text.c_str(), stdout);
     return {};
   }
   FIG_RETURN_IF_ERROR(ports::write_file_atomically(options.output, std::as_bytes(std::span(text))));
-  if (options.json) {
-    nlohmann::ordered_json json = json_header("pose");
-    json["motion"] = options.from;
-    json["frame"] = options.frame;
-    json["output"] = options.output;
-    json["joints"] = motion.joint_names.size();
-    json["size_bytes"] = text.size();
-    print_json(json);
-  }
-  return {};
+  nlohmann::ordered_json json = json_header("pose");
+  json["motion"] = options.from;
+  json["frame"] = options.frame;
+  json["output"] = options.output;
+  json["joints"] = motion.joint_names.size();
+  json["size_bytes"] = text.size();
+  return write_json(options.json, json);
 }
 
 }  // namespace
@@ -57,12 +54,11 @@ Command add_pose_command(CLI::App& app) {
       app.add_subcommand("pose", "Writes a frame of a motion as a pose file (.json)");
   command->add_option("--from", options->from, "motion package (.fgn)")->required();
   command->add_option("--frame", options->frame, "of the motion, counted from 0")
-      ->check(CLI::Range(0u, UINT32_MAX - 1))
+      ->check(ports::between(0, UINT32_MAX - 1))
       ->capture_default_str();
   CLI::Option* output =
       command->add_option("-o,--output", options->output, "x.json; default: standard output");
-  command->add_flag("--json", options->json, "print a summary as JSON to standard output")
-      ->needs(output);
+  ports::add_json_option(*command, options->json)->needs(output);
   return {command, [options] { return run_pose(*options); }};
 }
 

@@ -6,7 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "ports/command_line/values.h"
 #include "ports/host/clock.h"
+#include "ports/host/process.h"
 #include "samples/common/camera_path.h"
 #include "samples/common/device_options.h"
 #include "samples/common/file_sink.h"
@@ -27,8 +29,8 @@ struct RenderOptions {
   SceneOptions scene;
   DeviceOptions device;
   OmissionOptions omissions;
-  std::string frames, camera, size, background, follow = "smooth", framing = "body";
-  std::optional<float> near_m;
+  ViewOptions view;
+  std::string frames, background;
   std::optional<double> frames_per_second;
   std::vector<std::string> outputs;
   std::string contact_sheet;
@@ -114,24 +116,11 @@ Result<Job> prepare(const RenderOptions& options) {
           ? turntable_frames(*frames, rate_hz, options.frames_per_second, *options.turntable)
           : frames_in_time(*frames, rate_hz, options.frames_per_second);
 
-  CameraPathOptions camera_path{.follow = options.follow == "smooth",
-                                .near_m = options.near_m,
-                                .frames_per_second = shown.frames_per_second,
-                                .turntable = options.turntable.has_value()};
-  if (!options.size.empty()) {
-    const Result<ImageSize> size = parse_size(options.size);
-    if (!size.ok()) return size.status();
-    camera_path.size = *size;
-  }
-  const Result<Framing> framing = parse_framing(options.framing);
-  if (!framing.ok()) return framing.status();
-  camera_path.framing = *framing;
-  if (!options.camera.empty()) {
-    const Result<CameraSpec> camera = parse_camera_spec(options.camera);
-    if (!camera.ok()) return camera.status();
-    camera_path.camera = *camera;
-  }
-  return Job{std::move(*scene), std::move(shown), std::move(camera_path), background->colour};
+  Result<CameraPathOptions> camera_path = options.view.camera_path();
+  if (!camera_path.ok()) return camera_path.status();
+  camera_path->frames_per_second = shown.frames_per_second;
+  camera_path->turntable = options.turntable.has_value();
+  return Job{std::move(*scene), std::move(shown), std::move(*camera_path), background->colour};
 }
 
 Status run_render(const RenderOptions& options) {
@@ -185,8 +174,7 @@ Status run_render(const RenderOptions& options) {
     }
   }
 
-  if (!job->shown.note.empty())
-    std::fprintf(stderr, "figurine: render: %s\n", job->shown.note.c_str());
+  if (!job->shown.note.empty()) ports::say("render: " + job->shown.note);
   const Approximation approximation = options.omissions.approximation(job->shown.frames_per_second);
   RenderedFrame frame(size, format);
   FrameLog log;
@@ -211,9 +199,8 @@ Status run_render(const RenderOptions& options) {
   const double wall_s = static_cast<double>(ports::now_ns() - start_ns) * 1e-9;
 
   const std::optional<FileCamera>& camera = job->camera_path.camera.fixed;
-  if (camera && !camera->said.empty())
-    std::fprintf(stderr, "figurine: %s: %s\n", options.camera.c_str(), camera->said.c_str());
-  if (options.device.json) {
+  if (camera && !camera->said.empty()) ports::say(options.view.camera + ": " + camera->said);
+  if (!options.device.json.empty()) {
     nlohmann::ordered_json json = json_header("render");
     json["avatars"] = options.scene.avatars;
     json["output"] = options.outputs.empty() ? "" : options.outputs.front();
@@ -232,7 +219,7 @@ Status run_render(const RenderOptions& options) {
     json["peak_memory_bytes"] = peak_memory_bytes();
     json["machine"] =
         json_machine(options.device, (*renderer)->threads(), job->scene.precision(**renderer));
-    print_json(json);
+    return write_json(options.device.json, json);
   }
   return {};
 }
@@ -242,14 +229,8 @@ Status run_render(const RenderOptions& options) {
 Command add_render_command(CLI::App& app) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = app.add_subcommand("render", "Renders avatars to images or video");
-  command
-      ->add_option(
-          "avatars", options->scene.avatars,
-          "avatar packages (.fgn), or members of populations (people.fgn#NAME, people.fgn#17)")
-      ->required();
-  command->add_option("--body", options->scene.body,
-                      "body package; default: found by content hash beside the avatar, in "
-                      "FIGURINE_PATH, in the folders beside");
+  add_avatars_argument(*command, options->scene.avatars);
+  add_body_option(*command, options->scene.body);
   command
       ->add_option("--motion", options->scene.motions,
                    "motion packages: one for all avatars, or one for each")
@@ -264,58 +245,29 @@ Command add_render_command(CLI::App& app) {
       ->take_all();
   command->add_option("--frames", options->frames,
                       "N, A:B or A:B:STEP (B excluded); default: all, or frame 0 for one image");
-  command
-      ->add_option("--place", options->scene.places,
-                   "X,Z[,HEADING] in metres and degrees, once for each avatar")
-      ->expected(1)
-      ->take_all();
-  command->add_option("--spacing", options->scene.spacing_m, "metres between avatars side by side")
-      ->check(CLI::Range(-1000.0f, 1000.0f))
-      ->capture_default_str();
-  add_crowd_options(*command, options->scene);
-  command->add_option("--camera", options->camera,
-                      "orbit:AZ,EL,DIST[,FOV] or a JSON file; default: frames the figures");
-  command
-      ->add_option(
-          "--framing", options->framing,
-          "what of the figures the picture holds: body, bust (head and shoulders) or head; "
-          "an orbit is about its middle")
-      ->check(CLI::IsMember({"body", "bust", "head"}))
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--follow", options->follow,
-          "what an orbit's target does: smooth (goes along with the figures) or off (stays)")
-      ->check(CLI::IsMember({"smooth", "off"}))
-      ->capture_default_str();
-  command
-      ->add_option("--near", options->near_m,
-                   "metres; Gaussians nearer than this are culled; default 0.2")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--size", options->size,
-                      "WIDTHxHEIGHT; default: the camera's, or the avatar's golden frame's");
-  command->add_option("--background", options->background,
-                      "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha for images");
+  add_place_options(*command, options->scene);
+  options->view.add_to(*command);
+  add_background_option(*command, options->background, true, "alpha for images");
   command
       ->add_option("--fps", options->frames_per_second,
                    "frames a second, in real time: of a faster motion frames are left out, of a "
                    "slower one repeated; default: the motion's, divided by STEP")
-      ->check(CLI::PositiveNumber);
+      ->check(ports::positive());
   command
       ->add_option("--turntable", options->turntable,
                    "N frames in which an orbit goes round once; the motion starts again where it "
                    "ends, and one frame (--frames 7) stands still")
-      ->check(CLI::Range(2u, 100000u));
+      ->check(ports::between(2, 100000));
   command->add_option("--contact-sheet", options->contact_sheet,
                       "also put evenly chosen frames into one .png or .jpg");
   command->add_option("--columns", options->sheet.columns, "of the contact sheet")
-      ->check(CLI::Range(1u, 100u))
+      ->check(ports::between(1, 100))
       ->capture_default_str();
   command->add_option("--tiles", options->sheet.tiles, "of the contact sheet")
-      ->check(CLI::Range(1u, 10000u))
+      ->check(ports::between(1, 10000))
       ->capture_default_str();
   command->add_option("--sheet-shrink", options->sheet.shrink, "tiles are 1/N of a frame")
-      ->check(CLI::Range(1u, 64u))
+      ->check(ports::between(1, 64))
       ->capture_default_str();
   command
       ->add_option("-o,--output", options->outputs,

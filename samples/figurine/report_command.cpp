@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "ports/command_line/values.h"
 #include "ports/host/clock.h"
 #include "ports/media/png.h"
 #include "samples/common/camera_path.h"
@@ -417,8 +418,7 @@ Status run_report(const ReportOptions& options) {
   std::vector<ReportPicture> pictures;
   FIG_RETURN_IF_ERROR(draw_pictures(drawing, options.frames / 2, table[0], pictures));
   FIG_RETURN_IF_ERROR(write_report(options.output, json, report_html(json, pictures)));
-  if (options.device.json) print_json(json);
-  return {};
+  return write_json(options.device.json, json);
 }
 
 }  // namespace
@@ -433,20 +433,15 @@ Command add_report_command(CLI::App& app) {
                    "avatar or sampler package (.fgn), or a member of a population "
                    "(people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option("--body", options->scene.body,
-                      "body package; default: found by content hash beside the avatar, in "
-                      "FIGURINE_PATH, in the folders beside");
-  command
-      ->add_option("--motion", options->scene.motions,
-                   "motion package; default: the golden pose, swaying")
-      ->expected(1);
+  add_body_option(*command, options->scene.body);
+  add_motion_option(*command, options->scene.motions, "the golden pose, swaying");
   command->add_option("--frames", options->frames, "measured frames, evenly over the motion")
-      ->check(CLI::Range(1u, 10000u))
+      ->check(ports::between(1, 10000))
       ->capture_default_str();
   command->add_option("--seeds", options->seeds, "of a sampler: people whose errors are pooled")
-      ->check(CLI::Range(1u, 1000u))
+      ->check(ports::between(1, 1000))
       ->capture_default_str();
-  command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the golden frame's");
+  add_size_option(*command, options->size, "the golden frame's");
   command->add_option("-o,--output", options->output, "folder for report.json and report.html")
       ->required();
   options->device.add_to(*command);

@@ -10,8 +10,10 @@
 #include "figurine/avatar_sampler.h"
 #include "figurine/renderer.h"
 #include "formats/writer/package_writer.h"
+#include "ports/command_line/values.h"
 #include "ports/host/clock.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "samples/common/device_options.h"
 #include "samples/common/file_sink.h"
 #include "samples/common/loading.h"
@@ -26,12 +28,12 @@ namespace figurine::samples {
 namespace {
 
 struct SampleOptions {
-  std::string sampler, body, precision = "q8", solver, name, output, trace, isa;
+  std::string sampler, body, precision = "q8", solver, name, output, trace;
   SampleRequest request;
   std::optional<uint64_t> to;
   std::optional<double> mix;
-  Isa kernels = Isa::kBaseline;  // that --isa and the environment ask for
-  bool json = false;
+  DeviceOptions device;
+  RendererOptions renderer;  // that they ask for
 };
 
 // A person in the golden pose, as the golden camera sees it.
@@ -41,8 +43,8 @@ struct GoldenPicture {
 };
 
 Result<GoldenPicture> draw(const Avatar& avatar, const Package& body, Precision precision,
-                           Isa isa) {
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create({.threads = 1, .isa = isa});
+                           const RendererOptions& options) {
+  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(options);
   if (!renderer.ok()) return renderer.status();
   const Result<AvatarId> id = (*renderer)->add_avatar(avatar, body, precision);
   if (!id.ok()) return id.status();
@@ -63,7 +65,8 @@ Result<GoldenPicture> draw(const Avatar& avatar, const Package& body, Precision 
 class Strip final : public AvatarSampler::Trace {
  public:
   static Result<std::unique_ptr<Strip>> create(const std::string& folder, const Sampler& sampler,
-                                               const Package& body, uint32_t steps, Isa isa) {
+                                               const Package& body, uint32_t steps,
+                                               const RendererOptions& renderer) {
     std::error_code error;
     std::filesystem::create_directories(folder, error);
     if (error) return Status(StatusCode::kIo, folder + ": cannot be created: " + error.message());
@@ -75,13 +78,13 @@ class Strip final : public AvatarSampler::Trace {
         {.frame_size = size, .frame_count = steps, .columns = 10, .tiles = 10});
     if (!sheet.ok()) return sheet.status();
     return std::unique_ptr<Strip>(
-        new Strip(folder, body, isa, std::move(*sink), std::move(*sheet)));
+        new Strip(folder, body, renderer, std::move(*sink), std::move(*sheet)));
   }
 
   Status after_step(uint32_t step, double, const SampledAvatar& avatar) override {
     FIG_RETURN_IF_ERROR(check_interrupt());
     const Result<GoldenPicture> picture =
-        draw(avatar.avatar(), *body_, Precision::kFixedPoint, isa_);
+        draw(avatar.avatar(), *body_, Precision::kFixedPoint, renderer_);
     if (!picture.ok()) return picture.status();
     sheet_.offer(step - 1, picture->frame.u8);
     return sink_->add(picture->frame, step - 1);
@@ -93,17 +96,17 @@ class Strip final : public AvatarSampler::Trace {
   }
 
  private:
-  Strip(std::string folder, const Package& body, Isa isa, std::unique_ptr<FileSink> sink,
-        ContactSheet sheet)
+  Strip(std::string folder, const Package& body, const RendererOptions& renderer,
+        std::unique_ptr<FileSink> sink, ContactSheet sheet)
       : folder_(std::move(folder)),
         body_(&body),
-        isa_(isa),
+        renderer_(renderer),
         sink_(std::move(sink)),
         sheet_(std::move(sheet)) {}
 
   std::string folder_;
   const Package* body_;
-  Isa isa_;
+  RendererOptions renderer_;
   std::unique_ptr<FileSink> sink_;
   ContactSheet sheet_;
 };
@@ -142,9 +145,10 @@ std::string default_name(const Sampler& sampler, const SampleRequest& request) {
 // and integers as asked for.
 Result<std::vector<std::byte>> pack(const SampleOptions& options, const LoadedPackage& sampler,
                                     const Package& body, Avatar avatar) {
+  // On one thread, however many there are: the memory that the package states depends on them.
   const Result<GoldenPicture> picture =
       draw(avatar, body, options.precision == "f32" ? Precision::kFloat32 : Precision::kFixedPoint,
-           options.kernels);
+           {.threads = 1, .isa = options.renderer.isa});
   if (!picture.ok()) return picture.status();
   if (options.precision != "f32") {
     avatar.golden.fixed_point_hash = hash_picture(picture->frame.u8.pixels);
@@ -188,15 +192,11 @@ struct Sampled {
                             // pages included
 };
 
-void print_summary(const SampleOptions& options, const Sampler& from, const AvatarSampler& sampler,
+Status print_summary(const SampleOptions& options, const Sampler& from, const AvatarSampler& sampler,
                    const Sampled& sampled) {
   const uint32_t evaluations = steps_of(options.request, from);
-  if (!options.json) {
-    std::fprintf(stderr, "%s: %s, %u evaluations in %.2f s, weights %s\n", options.output.c_str(),
-                 sampled.name.c_str(), evaluations, sampled.sample_s,
-                 format_hash(sampled.hash).c_str());
-    return;
-  }
+  ports::say(std::format("{}: {}, {} evaluations in {:.2f} s, weights {}", options.output,
+                         sampled.name, evaluations, sampled.sample_s, format_hash(sampled.hash)));
   nlohmann::ordered_json json = json_header("sample");
   json["sampler"] = options.sampler;
   json["output"] = options.output;
@@ -211,7 +211,7 @@ void print_summary(const SampleOptions& options, const Sampler& from, const Avat
   json["sampler_memory_bytes"] = sampler.memory_bytes();
   json["peak_memory_bytes"] = sampled.peak_bytes;
   json["machine"] = json_sampling_machine(sampler.isa());
-  print_json(json);
+  return write_json(options.device.json, json);
 }
 
 Status run_sample(SampleOptions options) {
@@ -220,16 +220,16 @@ Status run_sample(SampleOptions options) {
   const Result<SampleRequest> request = checked_request(options);
   if (!request.ok()) return request.status();
   options.request = *request;
-  const Result<Isa> isa = instruction_set(options.isa);
-  if (!isa.ok()) return isa.status();
-  options.kernels = *isa;
+  const Result<RendererOptions> renderer = options.device.renderer_options();
+  if (!renderer.ok()) return renderer.status();
+  options.renderer = *renderer;
 
   const uint64_t start_ns = ports::now_ns();
   const Result<std::unique_ptr<LoadedPackage>> loaded =
       load_package(options.sampler, PackageKind::kSampler);
   if (!loaded.ok()) return loaded.status();
   const Sampler& from = (*loaded)->package.sampler();
-  const Result<std::unique_ptr<AvatarSampler>> sampler = AvatarSampler::create(from, *isa);
+  const Result<std::unique_ptr<AvatarSampler>> sampler = AvatarSampler::create(from, renderer->isa);
   if (!sampler.ok()) return sampler.status().within(options.sampler);
   const uint64_t loaded_ns = ports::now_ns();
 
@@ -247,7 +247,7 @@ Status run_sample(SampleOptions options) {
   if (!options.trace.empty()) {
     const uint32_t steps = steps_of(options.request, from);
     Result<std::unique_ptr<Strip>> created =
-        Strip::create(options.trace, from, (*body)->package, steps, *isa);
+        Strip::create(options.trace, from, (*body)->package, steps, *renderer);
     if (!created.ok()) return created.status();
     strip = std::move(*created);
     SampledAvatar again;  // the same person, watched
@@ -263,14 +263,14 @@ Status run_sample(SampleOptions options) {
   const auto seconds = [](uint64_t from_ns, uint64_t to_ns) {
     return static_cast<double>(to_ns - from_ns) * 1e-9;
   };
-  print_summary(options, from, **sampler,
-                {.name = avatar.name,
-                 .hash = hash_weights(avatar.fixed_point, avatar.shape, avatar.static_part),
-                 .size_bytes = bytes->size(),
-                 .open_s = seconds(start_ns, loaded_ns),
-                 .sample_s = seconds(loaded_ns, sampled_ns),
-                 .peak_bytes = peak_bytes});
-  return {};
+  return print_summary(
+      options, from, **sampler,
+      {.name = avatar.name,
+       .hash = hash_weights(avatar.fixed_point, avatar.shape, avatar.static_part),
+       .size_bytes = bytes->size(),
+       .open_s = seconds(start_ns, loaded_ns),
+       .sample_s = seconds(loaded_ns, sampled_ns),
+       .peak_bytes = peak_bytes});
 }
 
 }  // namespace
@@ -285,31 +285,28 @@ Command add_sample_command(CLI::App& app) {
       ->required();
   command->add_option("--to", options->to, "second seed, to blend with");
   command->add_option("--mix", options->mix, "how far from --seed to --to, 0 to 1")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(ports::between(0.0, 1.0));
   command
       ->add_option("--steps", options->request.steps,
                    "evaluations of the denoiser; default: the sampler's")
-      ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
+      ->check(ports::between(1, kMaxSolverSteps));
   command
       ->add_option("--solver", options->solver,
-                   "ddim (first order) or dpmpp2m (second order); default: the sampler's")
-      ->check(CLI::IsMember({"ddim", "dpmpp2m"}));
+                   "ddim is of first order, dpmpp2m of second; default: the sampler's")
+      ->check(ports::one_of({"ddim", "dpmpp2m"}));
   command
       ->add_option("--precision", options->precision,
-                   "what the avatar holds: fixed point, float weights, or both")
-      ->check(CLI::IsMember({"q8", "f32", "f32,q8"}))
+                   "arithmetic that the avatar is made for: fixed point, float weights, or both")
+      ->check(ports::one_of({"q8", "f32", "f32,q8"}))
       ->capture_default_str();
-  command->add_option("--body", options->body,
-                      "body package; default: found by content hash beside the sampler, in "
-                      "FIGURINE_PATH, in the folders beside");
+  add_body_option(*command, options->body);
   command->add_option("--name", options->name,
                       "of the avatar; default: the sampler's name and the seed");
   command->add_option(
       "--trace", options->trace,
       "folder: a picture of the avatar after every step, and strip.png of ten of them");
   command->add_option("-o,--output", options->output, "avatar package to write (.fgn)")->required();
-  add_isa_option(*command, options->isa);
-  command->add_flag("--json", options->json, "print a summary as JSON");
+  options->device.add_to(*command, {.precision = true});  // it has one of its own
   return {command, [options] { return run_sample(*options); }};
 }
 

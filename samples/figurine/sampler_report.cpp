@@ -249,7 +249,7 @@ Status run_sampler_report(const LoadedPackage& package, const SamplerReportOptio
                                       settings[m], floor));
   }
   FIG_RETURN_IF_ERROR(write_report(options.output, json, report_html(json, pictures)));
-  if (options.json) print_json(json);
+  FIG_RETURN_IF_ERROR(write_json(options.json, json));
   return {};
 }
 

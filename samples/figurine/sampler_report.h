@@ -16,7 +16,7 @@ struct SamplerReportOptions {
   std::optional<Isa> isa;  // none: the largest there is
   uint32_t seeds = 4;      // 0, 1, ...: people whose errors are pooled
   std::string output;      // folder for report.json and report.html
-  bool json = false;
+  std::string json;        // as write_json() takes it
 };
 
 Status run_sampler_report(const LoadedPackage& sampler, const SamplerReportOptions& options);

@@ -214,19 +214,19 @@ Status run_sampler_selftest(const Package& package, const std::string& path,
                     {"passed", here == there},
                     {"hash", here},
                     {"golden_hash", there}});
-    if (!options.json) {
+    if (options.json != "-") {
       std::printf("%s: %s %s: %s\n", path.c_str(), seed.c_str(),
                   here == there ? "agrees to the bit" : "DIFFERS", here.c_str());
     }
     progress.update(rows.size());
   }
-  if (options.json) {
+  if (!options.json.empty()) {
     nlohmann::ordered_json json = json_header("selftest");
     json["sampler"] = path;
     json["passed"] = reason.empty();
     json["golden_seeds"] = rows;
     json["machine"] = json_sampling_machine((*device)->isa());
-    print_json(json);
+    FIG_RETURN_IF_ERROR(write_json(options.json, json));
   }
   return reason.empty() ? Status()
                         : Status(StatusCode::kMismatch, path + ": golden seeds: " + reason);
@@ -246,7 +246,7 @@ Status run_selftest(const SelftestOptions& options) {
   const auto failed = std::find_if(verdicts->begin(), verdicts->end(),
                                    [](const Verdict& verdict) { return !verdict.passed; });
   const bool passed = failed == verdicts->end();
-  if (options.device.json) {
+  if (!options.device.json.empty()) {
     nlohmann::ordered_json json = json_header("selftest");
     json["avatar"] = path;
     json["passed"] = passed;
@@ -255,8 +255,9 @@ Status run_selftest(const SelftestOptions& options) {
                                   : verdicts->front().json.contains("fixed_point") ? "q8"
                                                                                    : "f32";
     json["machine"] = json_machine(options.device, renderer_options->threads, precision);
-    print_json(json);
-  } else {
+    FIG_RETURN_IF_ERROR(write_json(options.device.json, json));
+  }
+  if (options.device.json != "-") {
     for (const Verdict& verdict : *verdicts)
       std::printf("%s: %s\n", path.c_str(), verdict.text.c_str());
   }
@@ -277,9 +278,7 @@ Command add_selftest_command(CLI::App& app) {
                    "avatar or sampler package (.fgn), or a member of a population "
                    "(people.fgn#NAME, people.fgn#17)")
       ->required();
-  command->add_option("--body", options->scene.body,
-                      "body package; default: found by content hash beside the avatar, in "
-                      "FIGURINE_PATH, in the folders beside");
+  add_body_option(*command, options->scene.body);
   options->device.add_to(*command);
   return {command, [options] { return run_selftest(*options); }};
 }

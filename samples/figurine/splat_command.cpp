@@ -3,8 +3,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "ports/command_line/values.h"
 #include "ports/host/clock.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "samples/common/camera_spec.h"
 #include "samples/common/device_options.h"
 #include "samples/common/file_sink.h"
@@ -50,13 +52,11 @@ Result<Camera> choose_camera(const SplatCommandOptions& options, const CameraSpe
 }
 
 // What was read and taken for granted, a line each for file and camera.
-void say(const SplatCommandOptions& options, const GaussianCloud& cloud, const CameraSpec& spec,
-         uint64_t visible) {
-  std::fprintf(stderr, "figurine: %s: %s\n", options.scene.c_str(), ports::describe(cloud).c_str());
-  if (spec.fixed && !spec.fixed->said.empty())
-    std::fprintf(stderr, "figurine: %s: %s\n", options.camera.c_str(), spec.fixed->said.c_str());
-  if (visible == 0)
-    std::fprintf(stderr, "figurine: %s: no Gaussian is in the picture\n", options.scene.c_str());
+void say_what_was_read(const SplatCommandOptions& options, const GaussianCloud& cloud,
+                       const CameraSpec& spec, uint64_t visible) {
+  ports::say(options.scene + ": " + ports::describe(cloud));
+  if (spec.fixed && !spec.fixed->said.empty()) ports::say(options.camera + ": " + spec.fixed->said);
+  if (visible == 0) ports::say(options.scene + ": no Gaussian is in the picture");
 }
 
 Status run_splat(SplatCommandOptions options) {
@@ -106,8 +106,8 @@ Status run_splat(SplatCommandOptions options) {
   FIG_RETURN_IF_ERROR((*sink)->add(frame, 0));
   FIG_RETURN_IF_ERROR((*sink)->finish());
 
-  say(options, *cloud, spec, (*renderer)->statistics().visible);
-  if (options.device.json) {
+  say_what_was_read(options, *cloud, spec, (*renderer)->statistics().visible);
+  if (!options.device.json.empty()) {
     nlohmann::ordered_json json = json_header("splat");
     json["scene"] = options.scene;
     json["output"] = options.output;
@@ -126,7 +126,7 @@ Status run_splat(SplatCommandOptions options) {
     json["peak_memory_bytes"] = peak_memory_bytes();
     json["machine"] =
         json_machine(options.device, (*renderer)->threads(), to_string(Precision::kFloat32));
-    print_json(json);
+    return write_json(options.device.json, json);
   }
   return {};
 }
@@ -146,32 +146,26 @@ Command add_splat_command(CLI::App& app) {
       ->add_option("scene", options->scene,
                    "Gaussians: .ply of 3DGS and its kin, compressed .ply, .splat, .spz")
       ->required();
-  command->add_option("--camera", options->camera,
-                      "orbit:AZ,EL,DIST[,FOV], a JSON file, cameras.json#N of 3DGS or "
-                      "transforms.json#N of a NeRF; default: the whole scene from the front");
+  add_camera_option(*command, options->camera, "the whole scene from the front");
   command
       ->add_option("--up", options->up,
                    "which axis of the file points up, for orbits: +y, -y, +z, -z, +x or -x; auto: "
                    "as the file says, or -y")
-      ->check(CLI::IsMember(up_choices()))
+      ->check(ports::one_of(up_choices()))
       ->capture_default_str();
-  command
-      ->add_option("--near", options->near_m,
-                   "metres; Gaussians nearer than this are culled; default 0.2, of a camera near "
-                   "the scene a tenth of its distance")
-      ->check(CLI::PositiveNumber);
+  add_near_option(*command, options->near_m,
+                  "0.2, of a camera near the scene a tenth of its distance");
   command
       ->add_option("--alpha-cut", options->alpha_cut,
                    "contributions below it are skipped; default 1/255")
-      ->check(CLI::Range(1e-9f, 0.5f));
+      ->check(ports::between(1e-9, 0.5));
   command->add_flag("--antialiased,!--no-antialiased", options->antialiased,
                     "for scenes that were trained with Mip-Splatting's 2D filter (gsplat: "
                     "rasterize_mode antialiased, eps2d 0.1); default: as the file's comments say");
-  command->add_option("--size", options->size, "WIDTHxHEIGHT; default: the camera's, or 1024x768");
-  command->add_option("--background", options->background,
-                      "alpha, black, grey, white, #RRGGBB or R,G,B; default: alpha");
+  add_size_option(*command, options->size, "the camera's, or 1024x768");
+  add_background_option(*command, options->background, true, "alpha, of .jpg a light grey");
   command->add_option("-o,--output", options->output, "x.png, x.jpg or x.pfm")->required();
-  options->device.add_to(*command);
+  options->device.add_to(*command, {.precision = true});  // there is no network
   return {command, [options] { return run_splat(*options); }};
 }
 

@@ -1,13 +1,15 @@
 // figurine-inspect: what a package is, what a device needs for it, where it came from; on the
 // reader alone. Of a file of Gaussians, what is read of it.
 //
-// Exit 0 if every package named is sound, 1 if one is not or what was printed is lost (the reason
-// on stderr, one line), 2 on wrong usage.
+// Exit 0 if every package named is sound, 1 if one is not; as all programs else
+// (docs/command_line.md).
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
+#include <optional>
+#include <span>
 #include <string>
 
+#include "ports/command_line/command_line.h"
 #include "ports/gaussians/gaussian_file.h"
 #include "ports/host/files.h"
 #include "ports/host/process.h"
@@ -26,7 +28,7 @@ using figurine::ports::MappedFile;
 struct Options {
   std::string path;
   std::string other_path;
-  bool json = false;
+  std::string json;  // where it goes: empty, "-" or a file
   bool tensors = false;
 };
 
@@ -45,9 +47,13 @@ Result<OpenedFile> open_file(const std::string& path) {
 
 void print(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stdout); }
 
-// Paths come from the command line and need not be UTF-8.
-void print(const Json& document) {
-  print(document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+// To where --json says. Paths come from the command line and need not be UTF-8.
+Status write_json(const Options& options, const Json& document) {
+  const std::string text = document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  if (options.json != "-")
+    return figurine::ports::write_file_atomically(options.json, std::as_bytes(std::span(text)));
+  print(text);
+  return {};
 }
 
 Status inspect_gaussians(const Options& options) {
@@ -59,8 +65,10 @@ Status inspect_gaussians(const Options& options) {
   if (!file.ok()) return file.status();
   const Result<GaussianCloud> cloud = figurine::ports::read_gaussians(file->bytes(), options.path);
   if (!cloud.ok()) return cloud.status();
-  if (options.json) {
-    print(Json{{"file", options.path},
+  if (!options.json.empty()) {
+    FIG_RETURN_IF_ERROR(write_json(
+        options,
+        Json{{"file", options.path},
                {"kind", "gaussians"},
                {"container", cloud->container},
                {"size_bytes", file->bytes().size()},
@@ -72,8 +80,9 @@ Status inspect_gaussians(const Options& options) {
                {"up", to_string(cloud->up_axis())},
                {"up_stated", cloud->up.has_value()},
                {"antialiased", cloud->antialiased},
-               {"remarks", cloud->remarks}});
-  } else {
+               {"remarks", cloud->remarks}}));
+  }
+  if (options.json != "-") {
     print(options.path + ": " + figurine::ports::describe(*cloud) + "\n");
   }
   return {};
@@ -90,15 +99,14 @@ Status inspect(const Options& options) {
     const Json comparison =
         figurine::inspect::compare(opened->package, bytes, options.path, other->package,
                                    other->file.bytes(), options.other_path);
-    options.json ? print(comparison) : print(figurine::inspect::print_comparison(comparison));
-    return {};
+    if (options.json != "-") print(figurine::inspect::print_comparison(comparison));
+    return options.json.empty() ? Status() : write_json(options, comparison);
   }
   Json document = figurine::inspect::describe(opened->package, options.path);
   if (options.tensors)
     document["tensors"] = figurine::inspect::describe_tensors(opened->package, bytes);
-  if (options.json) {
-    print(document);
-  } else {
+  if (!options.json.empty()) FIG_RETURN_IF_ERROR(write_json(options, document));
+  if (options.json != "-") {
     print(figurine::inspect::print_package(document));
     if (options.tensors) {
       print("\n" + figurine::inspect::print_tensors(document["tensors"]));
@@ -114,13 +122,15 @@ Status inspect(const Options& options) {
 int run(int argc, char** argv) {
   CLI::App app{
       "figurine-inspect: prints what a .fgn package is, what it needs and where it came from; of a "
-      "file of Gaussians, what is read of it"};
+      "file of Gaussians, what is read of it",
+      "figurine-inspect"};
   app.set_version_flag("--version", "figurine-inspect " FIGURINE_VERSION);
+  figurine::ports::prepare_help(app);
   Options options;
   app.add_option("package", options.path, "the package, or .ply, .splat, .spz")
       ->required()
       ->type_name("PKG");
-  app.add_flag("--json", options.json, "print JSON (documented in docs/package.md)");
+  figurine::ports::add_json_option(app, options.json);
   CLI::Option* tensors = app.add_flag(
       "--tensors", options.tensors,
       "list every array: type, shape, bytes, range, checksum; and the quantisation of every layer");
@@ -128,29 +138,16 @@ int run(int argc, char** argv) {
                  "compare with this package: fields, and the largest difference of each array")
       ->type_name("OTHER")
       ->excludes(tensors);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    const Status status = inspect(options);
-    if (status.ok()) return 0;
-    std::fprintf(stderr, "figurine-inspect: %s\n", status.message().c_str());
-    return 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "figurine-inspect: internal error: %s\n", error.what());
-    return 3;
-  }
+  if (const std::optional<int> code = figurine::ports::parse_command_line(app, argc, argv))
+    return *code;
+  const Status status = inspect(options);
+  if (status.ok()) return figurine::ports::kDone;
+  figurine::ports::say(status.message());
+  return figurine::ports::kBadInput;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  figurine::ports::prepare_process("figurine-inspect");
-  const int code = run(argc, argv);
-  const Status printed = figurine::ports::flush_standard_output();
-  if (code != 0 || printed.ok()) return code;
-  std::fprintf(stderr, "figurine-inspect: %s\n", printed.message().c_str());
-  return 1;
+  return figurine::ports::run_program("figurine-inspect", [&] { return run(argc, argv); });
 }

@@ -63,6 +63,13 @@ class Faults:
             self.found.append(what)
             print(f"injected: {what}", file=sys.stderr, flush=True)
 
+    def expect_lost(self, result, what):
+        """Behind what was said of the work, which was done: its files are there."""
+        error = result.stderr.decode(errors="replace")
+        self.expect(result.returncode == 1, f"{what}: exit code {result.returncode}: {error}")
+        self.expect("standard output: what was printed is lost" in error.rstrip().split("\n")[-1],
+                    f"{what}: not said: {error!r}", "not_one_line")
+
     def expect_line(self, result, what):
         error = result.stderr.decode(errors="replace")
         self.expect(result.returncode == 1, f"{what}: exit code {result.returncode}: {error}")
@@ -193,9 +200,9 @@ def lost_outputs(faults, commands):
         faults.begin(pathlib.Path(command[0]).name, "lost standard output")
         with open("/dev/full", "wb") as lost:
             result = faults.run(command, stdout=lost, stderr=subprocess.PIPE)
-        faults.expect_line(result, f"{what} > /dev/full")
+        faults.expect_lost(result, f"{what} > /dev/full")
         result = faults.run(["sh", "-c", 'exec "$@" >&-', "sh", *command])
-        faults.expect_line(result, f"{what} >&-")
+        faults.expect_lost(result, f"{what} >&-")
 
 
 def pipes_as_input(faults, top, commands):

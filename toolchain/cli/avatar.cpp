@@ -1,13 +1,14 @@
 // figurine-train avatar: trains one person's UNet, or every person's of a folder.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "figurine/gaussian.h"
+#include "ports/command_line/values.h"
+#include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/cli/train_all.h"
@@ -171,9 +172,9 @@ uint32_t slot_count(const AvatarArguments& arguments) {
 // Sums are in another order with another number of threads.
 void say_threads(const std::string& run, uint32_t before, uint32_t now) {
   if (now == before) {
-    std::printf("%s: goes on with %u threads, as it began\n", run.c_str(), now);
+    ports::sayf("%s: goes on with %u threads, as it began", run.c_str(), now);
   } else {
-    std::printf("%s: goes on with %u threads, began with %u: its end will differ in rounding\n",
+    ports::sayf("%s: goes on with %u threads, began with %u: its end will differ in rounding",
                 run.c_str(), now, before);
   }
 }
@@ -233,11 +234,11 @@ void train_one(const AvatarArguments& arguments) {
       train::train_avatar(make_request(arguments, arguments.data, run));
   if (arguments.quiet) return;
   if (result.was_finished) {
-    std::printf("%s: was finished already (%llu iterations)\n", run.c_str(),
+    ports::sayf("%s: was finished already (%llu iterations)", run.c_str(),
                 static_cast<unsigned long long>(result.state.iteration));
     return;
   }
-  std::printf("%s: %llu iterations in %s (%.1f a second), training PSNR %.2f dB\n", run.c_str(),
+  ports::sayf("%s: %llu iterations in %s (%.1f a second), training PSNR %.2f dB", run.c_str(),
               static_cast<unsigned long long>(result.state.iteration),
               train::format_duration(result.state.seconds).c_str(),
               static_cast<double>(result.state.iteration) / std::max(1e-9, result.state.seconds),
@@ -248,19 +249,19 @@ void train_one(const AvatarArguments& arguments) {
 
 void add_part_options(CLI::App* command, AvatarArguments& arguments) {
   command->add_option("--uv", arguments.uv, "Texels a side, as the body's (default: the preset's)")
-      ->check(CLI::Range(8, 1024));
+      ->check(ports::between(8, 1024));
   command
       ->add_option("--network", arguments.network,
                    "none: static values alone, whatever the pose (default unet)")
-      ->check(CLI::IsMember({"unet", "none"}));
+      ->check(ports::one_of({"unet", "none"}));
   command
       ->add_option(
           "--network-size", arguments.network_size,
           "Texels a side that the network sees: 1, 1/2, 1/4 or 1/8 of the body's (default: "
           "the preset's share: edge 1/2, fine 1/4, others all)")
-      ->check(CLI::Range(8, 1024));
+      ->check(ports::between(8, 1024));
   command->add_option("--channels", arguments.channels, "Of the network (default: the preset's)")
-      ->check(CLI::Range(1, 2048));
+      ->check(ports::between(1, 2048));
   command->add_option(
       "--static-grids", arguments.static_grids,
       "What every texel owns whatever the pose, by groups of channels and their "
@@ -271,15 +272,15 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
       ->add_option("--static-colour", arguments.static_colour,
                    "Static colours times the network's (gain, default) or added to them (sum: an "
                    "experiment, cannot be packed)")
-      ->check(CLI::IsMember({"gain", "sum"}));
+      ->check(ports::one_of({"gain", "sum"}));
   command
       ->add_option("--static-learning-rate", arguments.static_learning_rate,
                    "Of the static values, peak of the same schedule (default 1.5e-2)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ports::not_negative());
   command
       ->add_option("--static-penalty", arguments.static_penalty,
                    "Weight of the static values' mean square in the loss (default 0)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ports::not_negative());
   command->add_flag("--freeze-network", arguments.freeze_network,
                     "The network of --init stays: only the static values learn");
   CLI::Option* rank =
@@ -287,13 +288,13 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
           ->add_option("--network-rank", arguments.network_rank,
                        "The network of --init stays, but for an adapter of this rank on its "
                        "kernels, which learns beside the static values; packages hold the result")
-          ->check(CLI::Range(1, 256));
+          ->check(ports::between(1, 256));
   CLI::Option* adapter =
       command
           ->add_option("--network-adapter", arguments.adapter,
                        "residual: A B is added to a kernel (default); scale: the kernel is "
                        "multiplied by 1 + A B; basis: A alone is learned, B is --network-basis'")
-          ->check(CLI::IsMember({"residual", "scale", "basis"}))
+          ->check(ports::one_of({"residual", "scale", "basis"}))
           ->needs(rank);
   command
       ->add_option("--network-basis", arguments.basis,
@@ -303,7 +304,7 @@ void add_part_options(CLI::App* command, AvatarArguments& arguments) {
       ->add_option("--clip-gradient", arguments.clip_gradient,
                    "Largest norm of an iteration's gradients; run.json says the last (default 0: "
                    "none)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ports::not_negative());
 }
 
 void add_filter_options(CLI::App* command, AvatarArguments& arguments) {
@@ -311,12 +312,12 @@ void add_filter_options(CLI::App* command, AvatarArguments& arguments) {
       ->add_option("--smallest-extent", arguments.smallest_extent,
                    "on: no Gaussian below what the sharpest training view of its texel resolved, "
                    "for close-ups (default: the preset's)")
-      ->check(CLI::IsMember({"on", "off"}));
+      ->check(ports::one_of({"on", "off"}));
   command
       ->add_option("--antialiased", arguments.antialiased,
                    "on: what widens a small Gaussian to the pixel grid is taken from its opacity, "
                    "in training and on devices, for views from afar (default: the preset's)")
-      ->check(CLI::IsMember({"on", "off"}));
+      ->check(ports::one_of({"on", "off"}));
 }
 
 void add_perceptual_options(CLI::App* command, AvatarArguments& arguments) {
@@ -327,13 +328,13 @@ void add_perceptual_options(CLI::App* command, AvatarArguments& arguments) {
   command
       ->add_option("--perceptual-weight", arguments.perceptual_weight,
                    "Of the distance that it sees, beside 1 for L1 (default 0.01, the paper's)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(ports::not_negative())
       ->needs(network);
   command
       ->add_option("--perceptual-window", arguments.perceptual_window,
                    "Side in pixels of what it looks at in every picture, at a random place on the "
                    "person; 0: all of it (default 128)")
-      ->check(CLI::Range(0, 4096))
+      ->check(ports::between(0, 4096))
       ->needs(network);
 }
 
@@ -356,10 +357,10 @@ void add_avatar_command(CLI::App& app) {
   command
       ->add_option("--checkpoint-seconds", arguments->checkpoint_s,
                    "Between two checkpoints (default 30)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ports::not_negative());
   command->add_flag("--quiet", arguments->quiet, "No progress, no summary");
   command->add_option("--preset", arguments->preset, "Size of the network (default edge)")
-      ->check(CLI::IsMember({"nano", "edge", "fine", "paper"}));
+      ->check(ports::one_of({"nano", "edge", "fine", "paper"}));
   command->add_option("--init", arguments->init,
                       "Start from these weights (file or run) instead of the common initial ones");
   command->add_option("--seed", arguments->seed, "Of the order of the images (default 1)");
@@ -367,74 +368,71 @@ void add_avatar_command(CLI::App& app) {
       command
           ->add_option("--minutes", arguments->minutes,
                        "Train for so long (default 10); the learning rate follows the clock")
-          ->check(CLI::PositiveNumber);
+          ->check(ports::positive());
   command->add_option("--iterations", arguments->iterations, "Train for so many iterations instead")
-      ->check(CLI::PositiveNumber)
+      ->check(ports::positive())
       ->excludes(minutes);
   command
       ->add_option("--template", arguments->template_mode,
                    "Gaussians sit on the person's own shape (default) or on the mean template")
-      ->check(CLI::IsMember({"shaped", "mean"}));
+      ->check(ports::one_of({"shaped", "mean"}));
   command->add_flag("--freeze-pose", arguments->freeze_pose,
                     "Experiment: the network sees the rest pose in the true root orientation");
   command
       ->add_option("--fourier", arguments->fourier,
                    "Octaves of constant Fourier channels in the input, 1 to 10, or on (5) or off "
                    "(default: the preset's)")
-      ->check(CLI::IsMember({"on", "off"}) | CLI::Range(1, 10));
+      ->check(ports::one_of_or_whole_number({"on", "off"}, 1, 10));
   command
       ->add_option("--sh-degree", arguments->sh_degree,
                    "Of the colours' spherical harmonics (default: the preset's)")
-      ->check(CLI::Range(uint32_t{0}, kMaxShDegree));
+      ->check(ports::between(uint32_t{0}, kMaxShDegree));
   command
       ->add_option("--learning-rate", arguments->learning_rate,
                    "Peak of the schedule (default 2e-3)")
-      ->check(CLI::PositiveNumber);
+      ->check(ports::positive());
   command
       ->add_option("--optimiser", arguments->optimiser,
                    "muon (default): Muon for the kernels of hidden convolutions, AdamW for the "
                    "rest; adamw: AdamW for all, as in the paper")
-      ->check(CLI::IsMember({"adamw", "muon"}));
+      ->check(ports::one_of({"adamw", "muon"}));
   command->add_option("--weight-decay", arguments->weight_decay, "The optimiser's (default 0)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ports::not_negative());
   command
       ->add_option("--precision", arguments->precision,
                    "Of the convolutions (default auto: bf16 where the CPU has it)")
-      ->check(CLI::IsMember({"auto", "f32", "bf16"}));
+      ->check(ports::one_of({"auto", "f32", "bf16"}));
   command
       ->add_option("--background", arguments->background,
                    "Behind prediction and truth in the loss (default grey)")
-      ->check(CLI::IsMember({"black", "grey", "random"}));
+      ->check(ports::one_of({"black", "grey", "random"}));
   command
       ->add_option("--standoff", arguments->standoff,
                    "Draw Gaussians to hair, skirts and shoes that stand off the skin: on "
                    "(default), off, or a weight")
-      ->check(CLI::IsMember({"on", "off"}) | CLI::Range(0.0, 1000.0));
+      ->check(ports::one_of_or_number({"on", "off"}, 0, 1000));
   command
       ->add_option("--views-per-pose", arguments->views,
                    "Images of one pose an iteration (default 1, as in the paper)")
-      ->check(CLI::Range(1, 64));
+      ->check(ports::between(1, 64));
   command
       ->add_option("--poses", arguments->poses,
                    "Poses an iteration, side by side on threads of their own (default 1)")
-      ->check(CLI::Range(1, 64));
+      ->check(ports::between(1, 64));
   command
       ->add_option("--spacing-scale", arguments->spacing_scale,
                    "First radius of a Gaussian, in distances to the next texel (default 0.45)")
-      ->check(CLI::Range(0.05, 5.0));
+      ->check(ports::between(0.05, 5.0));
   command->add_option("--warmup", arguments->warmup,
                       "Iterations of fitting reference Gaussians first (default 0)");
-  command
-      ->add_option("--threads", arguments->threads,
-                   "Of a training (default: usable CPUs, at most 16; with --all: 1; with "
-                   "--resume: as many as the run began with)")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+  add_threads_option(*command, arguments->threads,
+                     "Of a training (default: usable CPUs, at most 16; with --all: 1; with "
+                     "--resume: as many as the run began with)");
   command
       ->add_option(
           "--slots", arguments->slots,
           "With --all: trainings at a time, each in its own process (default: cores / threads)")
-      ->check(CLI::Range(1, 256));
+      ->check(ports::between(1, 256));
   add_part_options(command, *arguments);
   add_filter_options(command, *arguments);
   add_perceptual_options(command, *arguments);

@@ -1,9 +1,10 @@
 // figurine-train basis: what directions many people's networks differ by from a shared one.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <memory>
 
+#include "ports/command_line/values.h"
+#include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/train/kernel_basis_file.h"
 
@@ -31,16 +32,16 @@ void add_basis_command(CLI::App& app) {
       ->required();
   command->add_option("RUN", arguments->runs, "Runs of people, or weights files")->required();
   command->add_option("--rank", arguments->rank, "Directions of a kernel, at most (default 8)")
-      ->check(CLI::Range(1, 256));
+      ->check(ports::between(1, 256));
   command->add_option("-o,--output", arguments->path, "File (.safetensors)")->required();
   command->callback([arguments] {
     const train::KernelBasisReport report = train::make_kernel_basis(
         arguments->shared, arguments->runs, arguments->rank, arguments->path);
     double sum = 0, least = 1;
     for (const double share : report.energy) sum += share, least = std::min(least, share);
-    std::printf(
+    ports::sayf(
         "%s: %zu people; %u directions a kernel hold %.1f %% of the differences in the "
-        "mean, %.1f %% in the worst layer\n",
+        "mean, %.1f %% in the worst layer",
         arguments->path.c_str(), report.people, arguments->rank,
         100 * sum / static_cast<double>(report.energy.size()), 100 * least);
   });

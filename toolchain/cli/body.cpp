@@ -8,7 +8,9 @@
 #include <optional>
 
 #include "formats/writer/package_writer.h"
+#include "ports/command_line/values.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "ports/media/png.h"
 #include "toolchain/body/atlas.h"
 #include "toolchain/body/atlas_picture.h"
@@ -190,11 +192,11 @@ void run_body(const BodyOptions& options) {
   }
   if (!options.report.empty()) write_report(options, figures, bytes.size());
   throw_if_error(ports::write_file_atomically(options.output, bytes), "-o");
-  std::printf("%s: %s body, %ux%u, %zu texels, %zu border, %u shape coefficients, %zu bytes\n",
+  ports::sayf("%s: %s body, %ux%u, %zu texels, %zu border, %u shape coefficients, %zu bytes",
               options.output.c_str(), model.name.c_str(), options.uv_size, options.uv_size,
               texels.texel.size(), texels.border_texel.size(), model.shape_count, bytes.size());
+  for (const std::string& source : provenance.sources) ports::say("source: " + source);
   print_figures(figures);
-  for (const std::string& source : provenance.sources) std::printf("source: %s\n", source.c_str());
 }
 
 }  // namespace
@@ -212,17 +214,17 @@ void add_body_command(CLI::App& app) {
   kind->require_option(1);
   command->add_option("--uv", options->uv_size, "Texels a side")
       ->required()
-      ->check(CLI::Range(8u, kMaxUvSize));
+      ->check(ports::between(8u, kMaxUvSize));
   command
       ->add_option("--shape-samples", options->samples,
                    "People behind the shape basis (--makehuman)")
-      ->check(CLI::Range(30u, 5000u));
+      ->check(ports::between(30u, 5000u));
   command->add_option("--seed", options->seed, "Seed of those people")
-      ->check(CLI::Range(uint64_t{0}, uint64_t{0xffffffffu}));
+      ->check(ports::between(uint64_t{0}, uint64_t{0xffffffffu}));
   command
       ->add_option("--atlas", options->atlas,
                    "source: the mesh's own layout; weighted: its charts, packed by --weight")
-      ->check(CLI::IsMember({"source", "weighted"}))
+      ->check(ports::one_of({"source", "weighted"}))
       ->capture_default_str();
   command
       ->add_option("--weight", options->weights,
@@ -234,7 +236,7 @@ void add_body_command(CLI::App& app) {
           "--coarsest-grid", options->coarsest_grid,
           "For weighted: between the cells of charts lie two others in a grid of this many a "
           "side; default: half of --uv")
-      ->check(CLI::Range(4u, kMaxUvSize));
+      ->check(ports::between(4u, kMaxUvSize));
   command->add_option("--report", options->report, "What is printed of the layout, as JSON");
   command->add_option("--sheet", options->sheet, "A picture of the layout, .png");
   command->add_option("-o,--output", options->output, "BODY.fgn")->required();

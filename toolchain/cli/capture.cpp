@@ -10,8 +10,10 @@
 #include <memory>
 
 #include "figurine/package.h"
+#include "ports/command_line/values.h"
 #include "ports/host/cpus.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "ports/media/png.h"
 #include "ports/motion/clip.h"
 #include "toolchain/capture/capture.h"
@@ -138,7 +140,7 @@ void run_capture(CaptureOptions options) {
     ports::RetargetReport report;
     motions.push_back(value_or_throw(ports::read_clip(
         path, package.body(), {.name = std::filesystem::path(path).stem().string()}, &report)));
-    if (!report.summary.empty()) std::printf("%s: %s\n", path.c_str(), report.summary.c_str());
+    if (!report.summary.empty()) ports::sayf("%s: %s", path.c_str(), report.summary.c_str());
     const std::string source = value_or_throw(ports::clip_source(path));
     // Once, however many motions come from the same clip.
     const bool known =
@@ -171,7 +173,7 @@ void run_capture(CaptureOptions options) {
   }
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  std::printf("%s: %u identities, %llu images of %s in %.1f s\n", request.output.c_str(),
+  ports::sayf("%s: %u identities, %llu images of %s in %.1f s", request.output.c_str(),
               request.identities, static_cast<unsigned long long>(images), options.size.c_str(),
               seconds);
   if (!options.sheet.empty()) write_sheet(options);
@@ -185,28 +187,28 @@ void add_capture_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "capture", "Photograph synthetic people from many views, in MVHumanNet's layout");
   command->add_option("--body", options->body, "BODY.fgn of a makehuman or mannequin body")
-      ->required()
-      ->check(CLI::ExistingFile);
+      ->required();
   command->add_option("--identities", request.identities, "People, numbered from 0")
-      ->check(CLI::Range(1u, 100'000u));
+      ->check(ports::between(1u, 100'000u));
   command->add_option("--identity", options->identity, "Only this one of them")
-      ->check(CLI::Range(0, 99'999));
+      ->check(ports::between(0, 99'999));
   command->add_option("--seed", request.seed, "The same seed gives the same bytes");
   command->add_option("--views", request.cameras.views, "Cameras that hold the whole person")
-      ->check(CLI::Range(1u, 200u));
+      ->check(ports::between(1u, 200u));
   request.cameras.bust_views = kDefaultBustViews;
   command
       ->add_option("--bust-views", request.cameras.bust_views,
                    "Cameras of head and shoulders beside them; 0: none")
-      ->check(CLI::Range(0u, 200u))
+      ->check(ports::between(0u, 200u))
       ->capture_default_str();
   request.cameras.bust_scale = kDefaultBustScale;
   command
       ->add_option("--bust-scale", request.cameras.bust_scale,
                    "Sides of their images over those of --size")
-      ->check(CLI::Range(0.25f, 4.0f))
+      ->check(ports::between(0.25f, 4.0f))
       ->capture_default_str();
-  command->add_option("--frames", request.frames, "Poses a person")->check(CLI::Range(1u, 10'000u));
+  command->add_option("--frames", request.frames, "Poses a person")
+      ->check(ports::between(1u, 10'000u));
   command->add_option("--size", options->size, "WxH of the images")->capture_default_str();
   command->add_option(
       "--motion", options->motions,
@@ -234,15 +236,16 @@ void add_capture_command(CLI::App& app) {
       ->add_option("--folds", options->folds,
                    "Folds of clothes: of every pose, frozen as at rest, or off")
       ->capture_default_str();
-  command->add_option("--threads", request.threads, "Default: as many as usable CPUs")
-      ->transform(usable_threads());
+  add_threads_option(*command, request.threads, "Default: as many as usable CPUs");
   command->add_flag("--resume", request.resume,
                     "Go on where an interrupted run of the same command stopped");
   command->add_option(
       "--sheet", options->sheet,
       "A contact sheet, .png or .jpg: of one identity, or one picture of each of several");
-  command->add_option("--sheet-columns", options->sheet_columns)->check(CLI::Range(1u, 40u));
-  command->add_option("--sheet-rows", options->sheet_rows)->check(CLI::Range(1u, 40u));
+  command->add_option("--sheet-columns", options->sheet_columns, "Of the contact sheet (default 6)")
+      ->check(ports::between(1, 40));
+  command->add_option("--sheet-rows", options->sheet_rows, "Of the contact sheet (default 2)")
+      ->check(ports::between(1, 40));
   command->add_option("-o,--output", request.output, "DIR; person K goes to DIR/K, six digits")
       ->required();
   request.threads = 0;

@@ -6,6 +6,7 @@
 
 #include "figurine/package.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/dataset/capture_check.h"
 #include "toolchain/dataset/picture_file.h"
@@ -40,9 +41,9 @@ void run(CheckArguments arguments) {
                        .body_hash = format_hash(package.content_hash()),
                        .origin = dataset::model_origin(package, arguments.body)});
   data.leave_out_blank_cameras();
-  std::printf("%s: %zu cameras, %zu frames\n", arguments.data.c_str(), data.cameras().size(),
+  ports::sayf("%s: %zu cameras, %zu frames", arguments.data.c_str(), data.cameras().size(),
               data.frames().size());
-  for (const std::string& remark : data.remarks()) std::printf("  %s\n", remark.c_str());
+  for (const std::string& remark : data.remarks()) ports::say(remark);
 
   const auto draw = [&](const dataset::ViewCheck& view, const ports::ImageU8& picture) {
     const std::string folder = arguments.output + "/" + data.cameras()[view.camera].name;
@@ -65,7 +66,7 @@ void run(CheckArguments arguments) {
                 100 * mean.body_in_mask, 100 * mean.joints_in_mask, mean.joint_distance_px,
                 mean.sharpness, camera.trouble.empty() ? "" : "  ", camera.trouble.c_str());
   }
-  if (draws) std::printf("pictures in %s\n", arguments.output.c_str());
+  if (draws) ports::say("pictures in " + arguments.output);
   if (check.misfits() > 0) {
     throw InputError(arguments.data + ": " + std::to_string(check.misfits()) + " of " +
                      std::to_string(check.cameras.size()) + " cameras do not fit the poses");

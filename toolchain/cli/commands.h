@@ -8,6 +8,10 @@ class App;
 
 namespace figurine::cli {
 
+// All of them, and what the program itself has. argv: for --force-threads, which is looked for
+// before options are read.
+void add_commands(CLI::App& app, int argc, const char* const* argv);
+
 void add_body_command(CLI::App& app);
 void add_motion_command(CLI::App& app);
 void add_capture_command(CLI::App& app);

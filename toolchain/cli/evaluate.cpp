@@ -11,6 +11,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "ports/command_line/values.h"
 #include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/report_head.h"
@@ -213,9 +214,7 @@ void add_run_options(CLI::App* command, const std::shared_ptr<EvaluateArguments>
                       "Where the data is now (default: where the run found it)");
   command->add_option("--body", arguments->open.body,
                       "Where the body is now (default: where the run found it)");
-  command->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+  add_threads_option(*command, arguments->open.threads, "Default: all cores");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");
 }
 
@@ -238,7 +237,7 @@ void add_evaluate_command(CLI::App& app) {
   reconstruction
       ->add_option("--view-frame-step", arguments->reconstruction.view_frame_step,
                    "Look at every n-th training pose only (default 1: all)")
-      ->check(CLI::PositiveNumber);
+      ->check(ports::positive());
   reconstruction->callback([arguments] { run_reconstruction(*arguments); });
 
   CLI::App* quantization = command->add_subcommand(
@@ -254,14 +253,12 @@ void add_evaluate_command(CLI::App& app) {
   quantization
       ->add_option("--qat-iterations", arguments->fine_tune.iterations,
                    "Of the fine-tune in RUN/qat (default 400)")
-      ->check(CLI::PositiveNumber);
+      ->check(ports::positive());
   quantization
       ->add_option("--views-per-pose", arguments->quantization.views_per_pose,
                    "Cameras of a held-out pose (default 4)")
-      ->check(CLI::PositiveNumber);
-  quantization->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+      ->check(ports::positive());
+  add_threads_option(*quantization, arguments->open.threads, "Default: all cores");
   quantization->add_flag("--quiet", arguments->quantization.quiet, "No progress");
   quantization->add_option("-o,--output", arguments->output, "Report to write, JSON");
   quantization->callback([arguments] { run_quantization(*arguments); });
@@ -277,11 +274,9 @@ void add_evaluate_command(CLI::App& app) {
   population
       ->add_option("--view-frame-step", arguments->requantization.view_frame_step,
                    "Look at every n-th training pose only (default 8)")
-      ->check(CLI::PositiveNumber);
+      ->check(ports::positive());
   population->add_flag("--quiet", arguments->requantization.quiet, "No progress");
-  population->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+  add_threads_option(*population, arguments->open.threads, "Default: all cores");
   population->add_option("-o,--output", arguments->output, "Report to write, JSON");
   population->callback([arguments] { run_population(*arguments); });
 
@@ -300,9 +295,9 @@ void add_evaluate_command(CLI::App& app) {
       ->required();
   parity
       ->add_option("--views", arguments->parity.views, "Held-out pictures to compare (default 12)")
-      ->check(CLI::PositiveNumber);
+      ->check(ports::positive());
   parity->add_option("--precision", arguments->precision, "Of both (default f32)")
-      ->check(CLI::IsMember({"f32", "q8"}));
+      ->check(ports::one_of({"f32", "q8"}));
   parity->callback([arguments] {
     arguments->parity.precision =
         arguments->precision == "q8" ? Precision::kFixedPoint : Precision::kFloat32;

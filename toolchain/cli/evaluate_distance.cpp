@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "ports/command_line/values.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/report_head.h"
 #include "toolchain/cli/threads.h"
@@ -71,19 +72,17 @@ void add_evaluate_distance_command(CLI::App& evaluate) {
       ->add_option("--scales", arguments->distance.scales,
                    "Sides of the pictures over the capture's, A,B (default 1/8 to 8 by twos)")
       ->delimiter(',')
-      ->check(CLI::Range(0.02, 16.0));
+      ->check(ports::between(0.02, 16.0));
   command->add_option("--poses", arguments->distance.poses, "Held-out ones (default 3)")
-      ->check(CLI::Range(1, 1000));
+      ->check(ports::between(1, 1000));
   command
       ->add_option("--views", arguments->distance.views,
                    "Cameras of each framing, held-out ones first (default 2)")
-      ->check(CLI::Range(1, 1000));
+      ->check(ports::between(1, 1000));
   command->add_option("--pictures", arguments->distance.pictures,
                       "Folder for a picture of each scale and framing, truth left, avatar right");
   command->add_flag("--quiet", arguments->distance.quiet, "No progress");
-  command->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+  add_threads_option(*command, arguments->open.threads, "Default: all cores");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");
   command->callback([arguments] { run_distance(*arguments); });
 }

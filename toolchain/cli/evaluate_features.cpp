@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "ports/command_line/values.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
@@ -105,14 +106,13 @@ void add_evaluate_features_command(CLI::App& evaluate) {
   command
       ->add_option("--first-pose", arguments->options.first_pose,
                    "Of the fixed poses (default 8: behind those of features)")
-      ->check(CLI::Range(0, 64));
-  command->add_option("--poses", arguments->options.poses, "Default 3")->check(CLI::Range(2, 64));
+      ->check(ports::between(0, 64));
+  command->add_option("--poses", arguments->options.poses, "Default 3")
+      ->check(ports::between(2, 64));
   command->add_option("--views", arguments->options.views, "Of every pose (default 3)")
-      ->check(CLI::Range(2, 64));
+      ->check(ports::between(2, 64));
   command->add_option("-o,--output", arguments->output, "Report to write, JSON")->required();
-  command->add_option("--threads", arguments->options.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+  add_threads_option(*command, arguments->options.threads, "Default: all cores");
   command->add_flag("--quiet", arguments->options.quiet, "No progress, no summary");
   command->callback([arguments] { run(*arguments); });
 }

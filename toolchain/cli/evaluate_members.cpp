@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "ports/command_line/values.h"
 #include "ports/host/files.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
@@ -174,7 +175,7 @@ void add_evaluate_members_command(CLI::App& evaluate) {
   command
       ->add_option("--worst", arguments->worst,
                    "Members of --worst-sheet, by PSNR on held-out poses (default 10)")
-      ->check(CLI::Range(1, 100));
+      ->check(ports::between(1, 100));
   command->add_option("--worst-sheet", arguments->worst_sheet,
                       "Picture of the worst members to write, JPEG");
   command
@@ -182,10 +183,8 @@ void add_evaluate_members_command(CLI::App& evaluate) {
           "--ranks", arguments->options.ranks,
           "Of the bases that held-out members are projected onto, A,B (default: powers of two)")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
-  command->add_option("--threads", arguments->threads, "Default: all cores")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+      ->check(ports::positive());
+  add_threads_option(*command, arguments->threads, "Default: all cores");
   command->add_flag("--quiet", arguments->quiet, "No progress");
   command->callback([arguments] { run_members(*arguments); });
 }

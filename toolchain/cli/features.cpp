@@ -1,10 +1,11 @@
 // figurine-train features: the network through which pictures of avatars are compared.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 
+#include "ports/command_line/values.h"
+#include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
@@ -23,11 +24,10 @@ void run(features::FeatureRequest request) {
   request.command = train::current_command();
   const features::FeatureResult result = features::train_features(request);
   if (request.quiet) return;
-  std::printf(
-      "%s: %s%llu iterations in %.0f s, loss %.3f, %.1f %% of training pictures told right\n",
-      request.output.c_str(), result.was_finished ? "was finished: " : "",
-      static_cast<unsigned long long>(result.iteration), result.seconds, result.loss,
-      100 * result.accuracy);
+  ports::sayf("%s: %s%llu iterations in %.0f s, loss %.3f, %.1f %% of training pictures told right",
+              request.output.c_str(), result.was_finished ? "was finished: " : "",
+              static_cast<unsigned long long>(result.iteration), result.seconds, result.loss,
+              100 * result.accuracy);
 }
 
 }  // namespace
@@ -48,27 +48,24 @@ void add_features_command(CLI::App& app) {
       "--motion", request->motion,
       "Motion package whose poses are drawn (default: golden poses of training members)");
   command->add_option("--poses", settings.poses, "Of every member (default 8)")
-      ->check(CLI::Range(2, 64));
+      ->check(ports::between(2, 64));
   command
       ->add_option("--views", settings.views, "Of every pose (default 6, fewer for many members)")
-      ->check(CLI::Range(2, 64));
+      ->check(ports::between(2, 64));
   command->add_option("--batch", settings.batch, "Pictures an iteration (default 48)")
-      ->check(CLI::Range(1, 4096));
+      ->check(ports::between(1, 4096));
   command->add_option("--iterations", settings.schedule.budget.iterations, "Default 1200")
-      ->check(CLI::Range(1u, 1u << 24));
+      ->check(ports::between(1u, 1u << 24));
   command
       ->add_option("--learning-rate", settings.schedule.peak,
                    "Of AdamW, at its highest (default 2e-3)")
-      ->check(CLI::Range(1e-9, 1.0));
+      ->check(ports::between(1e-9, 1.0));
   command->add_option("--weight-decay", settings.weight_decay, "Of AdamW (default 0.01)")
-      ->check(CLI::Range(0.0, 10.0));
+      ->check(ports::between(0.0, 10.0));
   command->add_option("--seed", settings.seed,
                       "Of weights, cameras, order and augmentation (default 1)");
-  command
-      ->add_option("--threads", request->threads,
-                   "Default: all cores; the result does not depend on it")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+  add_threads_option(*command, request->threads,
+                     "Default: all cores; the result does not depend on it");
   command->add_flag("--resume", request->resume,
                     "Go on from the checkpoint beside the output, by its own settings");
   command->add_flag("--quiet", request->quiet, "No progress, no summary");

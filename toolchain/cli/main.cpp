@@ -1,57 +1,32 @@
-// figurine-train: the offline commands. Only this folder catches exceptions: exit 1 bad input or a
-// lost standard output, 2 usage, 3 bug, 130 interrupted (state saved).
+// figurine-train: the offline commands. Only this folder catches exceptions. How it ends:
+// docs/command_line.md; 130 when interrupted, with its state saved.
 #include <CLI/CLI.hpp>
-#include <cstdio>
-#include <exception>
 
+#include "ports/command_line/command_line.h"
 #include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
-#include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/train/interrupt.h"
 
 namespace {
 
 int run(int argc, char** argv) {
-  CLI::App app{"figurine-train: bodies, captures, avatars and packages, offline"};
-  app.require_subcommand(1);
-  app.set_version_flag("--version", "figurine-train " FIGURINE_VERSION);
-  figurine::cli::add_force_threads(app, argc, argv);
-  figurine::cli::add_body_command(app);
-  figurine::cli::add_motion_command(app);
-  figurine::cli::add_capture_command(app);
-  figurine::cli::add_check_capture_command(app);
-  figurine::cli::add_avatar_command(app);
-  figurine::cli::add_basis_command(app);
-  figurine::cli::add_pack_command(app);
-  figurine::cli::add_population_command(app);
-  figurine::cli::add_sampler_command(app);
-  figurine::cli::add_features_command(app);
-  figurine::cli::add_evaluate_command(app);
+  using namespace figurine;
+  CLI::App app{"figurine-train: bodies, captures, avatars and packages, offline", "figurine-train"};
+  cli::add_commands(app, argc, argv);
   try {
-    app.parse(argc, argv);
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  } catch (const figurine::InputError& error) {
-    std::fprintf(stderr, "figurine-train: %s\n", error.what());
-    return 1;
-  } catch (const figurine::train::Interrupted& interrupted) {
-    std::fprintf(stderr, "figurine-train: %s\n", interrupted.what());
+    return ports::parse_command_line(app, argc, argv).value_or(ports::kDone);
+  } catch (const InputError& error) {
+    ports::say(error.what());
+    return ports::kBadInput;
+  } catch (const train::Interrupted& interrupted) {
+    ports::say(interrupted.what());
     return 130;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "figurine-train: internal error: %s\n", error.what());
-    return 3;
   }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  figurine::ports::prepare_process("figurine-train");
-  const int code = run(argc, argv);
-  const figurine::Status printed = figurine::ports::flush_standard_output();
-  if (code != 0 || printed.ok()) return code;
-  std::fprintf(stderr, "figurine-train: %s\n", printed.message().c_str());
-  return 1;
+  return figurine::ports::run_program("figurine-train", [&] { return run(argc, argv); });
 }

@@ -1,11 +1,12 @@
 // figurine-train motion: a captured clip, moved onto a body's skeleton, becomes a motion package.
 // The same as figurine motion of the device's half (ports/motion/import.h).
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <memory>
 
 #include "formats/writer/package_writer.h"
+#include "ports/command_line/command_line.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "ports/motion/import.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/error.h"
@@ -30,7 +31,8 @@ void run_motion(const MotionOptions& options) {
   const auto bytes =
       value_or_throw(write_package(motion.clip.view(), motion.provenance), options.output);
   throw_if_error(ports::write_file_atomically(options.output, bytes), "-o");
-  std::printf("%s: %s; %zu bytes\n", options.output.c_str(), motion.summary.c_str(), bytes.size());
+  ports::say(options.output + ": " + motion.summary + "; " + std::to_string(bytes.size()) +
+             " bytes");
 }
 
 }  // namespace
@@ -45,17 +47,7 @@ void add_motion_command(CLI::App& app) {
       ->required();
   command->add_option("--body", options->body, "BODY.fgn")->required();
   command->add_option("-o,--output", options->output, "MOTION.fgn")->required();
-  for (const ports::ImportOption& option : ports::import_options(options->import)) {
-    const auto set = [option](const std::string& text) {
-      const Status status = option.set(text);
-      if (!status.ok()) throw CLI::ValidationError(option.name, status.message());
-    };
-    if (option.is_flag) {
-      command->add_flag_callback(option.name, [set] { set(""); }, option.help);
-    } else {
-      command->add_option_function<std::string>(option.name, set, option.help);
-    }
-  }
+  ports::add_text_options(*command, ports::import_options(options->import));
   command->callback([options] { run_motion(*options); });
 }
 

@@ -2,11 +2,12 @@
 // package.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <memory>
 #include <optional>
 
+#include "ports/command_line/values.h"
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
@@ -88,7 +89,7 @@ void run_population(PackArguments arguments) {
   if (!arguments.pack.name.empty()) options.name = arguments.pack.name;
   const std::vector<std::byte> bytes = train::pack_population(options);
   throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
-  std::printf("%s: %zu bytes\n", arguments.output.c_str(), bytes.size());
+  ports::sayf("%s: %zu bytes", arguments.output.c_str(), bytes.size());
 }
 
 void run_avatar(PackArguments arguments) {
@@ -113,7 +114,7 @@ void run_avatar(PackArguments arguments) {
     arguments.pack.network = false;
     const std::vector<std::byte> bytes = train::pack_avatar(avatar, folder, arguments.pack);
     throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
-    std::printf("%s: %zu bytes, for a population that has the network\n", arguments.output.c_str(),
+    ports::sayf("%s: %zu bytes, for a population that has the network", arguments.output.c_str(),
                 bytes.size());
     return;
   }
@@ -129,7 +130,7 @@ void run_avatar(PackArguments arguments) {
   if (quantised) options.fixed_point_library = golden.library;
   const std::vector<std::byte> bytes = train::pack_avatar(avatar, folder, options);
   throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
-  std::printf("%s: %zu bytes, %.0f kB of memory on the device\n", arguments.output.c_str(),
+  ports::sayf("%s: %zu bytes, %.0f kB of memory on the device", arguments.output.c_str(),
               bytes.size(), static_cast<double>(options.peak_memory_bytes) / 1e3);
 }
 
@@ -143,7 +144,7 @@ void run_sampler(const PackArguments& arguments) {
   if (arguments.solver == "ddim") options.method = SolverMethod::kDdim;
   const std::vector<std::byte> bytes = generate::pack_sampler(options);
   throw_if_error(ports::write_file_atomically(arguments.output, bytes), "cannot save");
-  std::printf("%s: %zu bytes\n", arguments.output.c_str(), bytes.size());
+  ports::sayf("%s: %zu bytes", arguments.output.c_str(), bytes.size());
 }
 
 bool is_sampler(const std::vector<std::string>& inputs) {
@@ -189,7 +190,7 @@ void add_pack_command(CLI::App& app) {
       ->add_option("--precision", arguments->precision,
                    "Float weights, fixed point or both (default f32); of a population's "
                    "differences q8 or f16 (default q8)")
-      ->check(CLI::IsMember({"f32", "q8", "f32,q8", "f16"}));
+      ->check(ports::one_of({"f32", "q8", "f32,q8", "f16"}));
   CLI::Option* population = command->add_flag("--population", arguments->is_population,
                                               "One package of many avatars of one network shape");
   command
@@ -214,7 +215,7 @@ void add_pack_command(CLI::App& app) {
       ->add_option("--levels", arguments->population.levels,
                    "Of a population's differences in q8, of either sign (default 127); fewer are "
                    "smaller and coarser")
-      ->check(CLI::Range(1u, kMostLevels))
+      ->check(ports::between(1u, kMostLevels))
       ->needs(population);
   command
       ->add_option("--split", arguments->population.split,
@@ -232,18 +233,16 @@ void add_pack_command(CLI::App& app) {
   command
       ->add_option("--steps", arguments->sampler.steps,
                    "Of a sampler: evaluations where nobody says otherwise (default 20)")
-      ->check(CLI::Range(size_t{1}, kMaxSolverSteps));
+      ->check(ports::between(size_t{1}, kMaxSolverSteps));
   command
       ->add_option("--solver", arguments->solver,
                    "Of a sampler: where nobody says otherwise (default dpmpp2m)")
-      ->check(CLI::IsMember({"ddim", "dpmpp2m"}));
+      ->check(ports::one_of({"ddim", "dpmpp2m"}));
   command
       ->add_option("--qat-iterations", arguments->fine_tuning.iterations,
                    "Of the fine-tune (default 400)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--threads", arguments->open.threads, "Default: all cores")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+      ->check(ports::positive());
+  add_threads_option(*command, arguments->open.threads, "Default: all cores");
   command->add_flag("--golden,!--no-golden", arguments->pack.golden,
                     "Carry an expected picture (default)");
   command->add_option("--name", arguments->pack.name,
@@ -254,9 +253,9 @@ void add_pack_command(CLI::App& app) {
   command->add_option("--author", arguments->pack.authors,
                       "Who made it; may be given several times");
   command->add_option("--permission", arguments->pack.avatar_permission, "Who may perform with it")
-      ->check(CLI::IsMember({"onlyAuthor", "onlySeparatelyLicensedPerson", "everyone"}));
+      ->check(ports::one_of({"onlyAuthor", "onlySeparatelyLicensedPerson", "everyone"}));
   command->add_option("--commercial", arguments->pack.commercial_usage, "Commercial use")
-      ->check(CLI::IsMember({"personalNonProfit", "personalProfit", "corporation"}));
+      ->check(ports::one_of({"personalNonProfit", "personalProfit", "corporation"}));
   command->add_option("--depicted-person", arguments->pack.depicted_person,
                       "\"synthetic\", or how consent was given");
   // What is a run's own is said when the run is packed.

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <memory>
 
+#include "ports/command_line/values.h"
 #include "ports/host/cpus.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/population/build.h"
@@ -50,11 +51,11 @@ void add_population_command(CLI::App& app) {
   command
       ->add_option("--slots", options->slots,
                    "People at a time, each in a process of one thread (default: all cores)")
-      ->check(CLI::Range(1, 256));
+      ->check(ports::between(1, 256));
   command->add_option("--pack-period", options->pack_period,
                       "Members between two writings of the package (default 30; 0: at the end)");
   command->add_option("--stop-after", *minutes, "Minutes after which no further member is begun")
-      ->check(CLI::PositiveNumber);
+      ->check(ports::positive());
   CLI::Option* shared_only =
       command->add_flag("--initial-weights-only", options->initial_weights_only,
                         "Stop when what all members share is learnt");

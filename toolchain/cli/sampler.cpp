@@ -5,6 +5,8 @@
 #include <memory>
 #include <optional>
 
+#include "ports/command_line/values.h"
+#include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/generate/sampler_trainer.h"
@@ -39,12 +41,14 @@ void run(SamplerArguments arguments) {
   request.place = generate::rank_place_from_environment();
   const generate::SamplerResult result = generate::train_sampler(request);
   if (request.quiet || request.place.rank > 0) return;
-  std::printf("%s: %s%llu iterations in %.0f s, loss %.5f", request.run.c_str(),
+  char validation[48] = "";
+  if (std::isfinite(result.validation_loss)) {
+    std::snprintf(validation, sizeof(validation), ", validation %.5f", result.validation_loss);
+  }
+  ports::sayf("%s: %s%llu iterations in %.0f s, loss %.5f%s", request.run.c_str(),
               result.was_finished ? "was finished: " : "",
-              static_cast<unsigned long long>(result.iteration), result.seconds, result.loss);
-  if (std::isfinite(result.validation_loss))
-    std::printf(", validation %.5f", result.validation_loss);
-  std::printf("\n");
+              static_cast<unsigned long long>(result.iteration), result.seconds, result.loss,
+              validation);
 }
 
 }  // namespace
@@ -67,90 +71,88 @@ void add_sampler_command(CLI::App& app) {
   command
       ->add_option("--variant", arguments->variant,
                    "What a token is (default basis: principal directions of a layer)")
-      ->check(CLI::IsMember({"layer", "flat", "latent", "basis"}));
+      ->check(ports::one_of({"layer", "flat", "latent", "basis"}));
   command
       ->add_option("--size", arguments->size,
                    "Of the transformer (default device; paper: d_model 512, feed-forward 2048)")
-      ->check(CLI::IsMember({"small", "device", "paper"}));
+      ->check(ports::one_of({"small", "device", "paper"}));
   command
       ->add_option("--d-model", arguments->d_model,
                    "Width of a token; a multiple of twice the heads")
-      ->check(CLI::Range(1, 1 << 14));
+      ->check(ports::between(1, 1 << 14));
   command->add_option("--blocks", arguments->blocks, "Transformer blocks")
-      ->check(CLI::Range(1, 256));
-  command->add_option("--heads", arguments->heads, "Attention heads")->check(CLI::Range(1, 256));
+      ->check(ports::between(1, 256));
+  command->add_option("--heads", arguments->heads, "Attention heads")
+      ->check(ports::between(1, 256));
   command->add_option("--feed-forward", arguments->feed_forward, "Width of the feed-forward layers")
-      ->check(CLI::Range(1, 1 << 16));
+      ->check(ports::between(1, 1 << 16));
   command
       ->add_option("--rank", settings.space.rank,
                    "Variant basis: most directions of a token (default 64)")
-      ->check(CLI::Range(1, 1024));
+      ->check(ports::between(1, 1024));
   command
       ->add_option("--chunk", settings.space.chunk,
                    "Variant flat: values of a token (default 4096)")
-      ->check(CLI::Range(1, 1 << 20));
+      ->check(ports::between(1, 1 << 20));
   command
       ->add_option("--latent-channels", settings.autoencoder.channels,
                    "Variant latent: of the map that the autoencoder makes (default 4)")
-      ->check(CLI::Range(1, 256));
+      ->check(ports::between(1, 256));
   command
       ->add_option(
           "--autoencoder-iterations", settings.autoencoder.schedule.budget.iterations,
           "Variant latent: budget of the autoencoder, which is trained first (default 4000)")
-      ->check(CLI::PositiveNumber);
+      ->check(ports::positive());
   command
       ->add_option("--kl-weight", settings.autoencoder.kl_weight,
                    "Variant latent: weight of the KL divergence (default 1e-3)")
-      ->check(CLI::Range(0.0, 1e3));
+      ->check(ports::between(0.0, 1e3));
   command
       ->add_option("--members", settings.members,
                    "Learn from the first so many training members (default all)")
-      ->check(CLI::Range(2u, kMaxMembers));
+      ->check(ports::between(2u, kMaxMembers));
   command->add_option("--batch", settings.batch, "Members an iteration (default 32)")
-      ->check(CLI::Range(1, 65536));
+      ->check(ports::between(1, 65536));
   command
       ->add_option("--learning-rate", settings.schedule.peak,
                    "Of AdamW, at its highest (default 2e-4)")
-      ->check(CLI::Range(1e-9, 1.0));
+      ->check(ports::between(1e-9, 1.0));
   command->add_option("--weight-decay", settings.weight_decay, "Of AdamW (default 0)")
-      ->check(CLI::Range(0.0, 10.0));
+      ->check(ports::between(0.0, 10.0));
   command
       ->add_option("--ema", settings.ema,
                    "Decay of the moving average of the weights (default 0.999)")
-      ->check(CLI::Range(0.0, 0.999999));
+      ->check(ports::between(0.0, 0.999999));
   command
       ->add_option("--clean-snr", settings.clean_snr,
                    "Signal-to-noise ratio where sampling ends (default 1e4)")
-      ->check(CLI::Range(1.0, 1e12));
+      ->check(ports::between(1.0, 1e12));
   command
       ->add_option("--noisy-end", settings.noisy_dimension_snr,
                    "Dimension times signal-to-noise ratio where sampling begins (default 0.1)")
-      ->check(CLI::Range(1e-9, 100.0));
+      ->check(ports::between(1e-9, 100.0));
   command->add_option("--seed", settings.seed, "Of weights, order and noise (default 1)");
   command->add_flag("--bf16,!--no-bf16", settings.bf16,
                     "Matrix products in bfloat16 (default: float)");
-  command
-      ->add_option("--threads", settings.threads,
-                   "Default: all cores; with --resume as many as the run began with")
-      ->check(CLI::Range(1, 256))
-      ->transform(usable_threads());
+  add_threads_option(*command, settings.threads,
+                     "Default: all cores; with --resume as many as the run began with");
   CLI::Option* iterations =
       command->add_option("--iterations", arguments->iterations, "Budget (default 10000)")
-          ->check(CLI::PositiveNumber);
+          ->check(ports::positive());
   command->add_option("--minutes", arguments->minutes, "Budget in minutes of training")
-      ->check(CLI::PositiveNumber)
+      ->check(ports::positive())
       ->excludes(iterations);
   command
       ->add_option(
           "--rank-timeout", request.rank_timeout_s,
           "Seconds that ranks wait for each other at most, under srun or WORLD_SIZE (default 600)")
-      ->check(CLI::Range(1.0, 1e6));
+      ->check(ports::between(1.0, 1e6));
   command->add_flag("--resume", request.resume,
                     "Go on from the run's checkpoint, by the run's own settings");
   command
       ->add_option("--checkpoint-seconds", request.checkpoint_period_s,
                    "Between two checkpoints (default 60), or 20 times what one takes")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ports::not_negative());
   command->add_flag("--quiet", request.quiet, "No progress, no summary");
   command->callback([arguments] { run(*arguments); });
 }

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstdio>
 #include <string_view>
 
 #include "ports/host/cpus.h"
+#include "ports/host/process.h"
 
 namespace figurine::cli {
 namespace {
@@ -20,8 +20,8 @@ std::string lower(std::string& text) {
   const uint32_t cpus = ports::usable_cpus();
   const bool number = error == std::errc() && end == text.data() + text.size();
   if (g_forced || !number || threads <= cpus || threads > kMost) return {};
-  std::fprintf(stderr, "figurine-train: --threads %u: lowered to the %u usable (%s)\n", threads,
-               cpus, kForce);
+  ports::say("--threads " + std::to_string(threads) + ": lowered to the " + std::to_string(cpus) +
+             " usable (" + kForce + ")");
   text = std::to_string(cpus);
   return {};
 }

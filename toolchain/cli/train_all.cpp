@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ports/host/files.h"
+#include "ports/host/process.h"
 #include "toolchain/error.h"
 #include "toolchain/train/csv.h"
 #include "toolchain/train/progress.h"
@@ -119,7 +120,7 @@ void train_all(const TrainAllOptions& options,
   train::run_in_slots(rows.size(), {.slots = options.slots}, job, on_end, on_wait);
   save_table(table, rows);
   if (!options.quiet)
-    std::printf("%s: %zu of %zu identities trained, table in %s\n", options.runs.c_str(),
+    ports::sayf("%s: %zu of %zu identities trained, table in %s", options.runs.c_str(),
                 rows.size() - failed, rows.size(), table.c_str());
   if (failed > 0)
     throw InputError(options.runs + ": " + std::to_string(failed) + " of " +

@@ -10,6 +10,7 @@
 #include "formats/writer/package_writer.h"
 #include "ports/host/files.h"
 #include "ports/host/folder_lock.h"
+#include "ports/host/process.h"
 #include "ports/motion/clip.h"
 #include "toolchain/body/atlas.h"
 #include "toolchain/body/makehuman_model.h"
@@ -336,11 +337,11 @@ void build(const BuildOptions& options) {
     if (const std::string failure = pack_apart(recipe, state); !failure.empty())
       throw InputError(failure);
   } else if (!options.quiet) {
-    std::printf("%s: %zu of %zu members of part %u of %u\n", options.state.c_str(), finished,
+    ports::sayf("%s: %zu of %zu members of part %u of %u", options.state.c_str(), finished,
                 table.size(), options.part, options.parts);
   }
   if (whole && !options.quiet) {
-    std::printf("%s: %zu of %zu members, package %s, table %s\n", options.state.c_str(), finished,
+    ports::sayf("%s: %zu of %zu members, package %s, table %s", options.state.c_str(), finished,
                 table.size(), state.package().c_str(), state.table().c_str());
   }
   if (failed > 0)

@@ -543,7 +543,7 @@ TEST(ClipSources, AUsersClipIsTheUsers) {
 TEST(ImportOptions, SayWhatIsWrongWithThem) {
   ImportSettings settings;
   const auto set = [&](const std::string& name, const std::string& text) {
-    for (const ImportOption& option : import_options(settings)) {
+    for (const TextOption& option : import_options(settings)) {
       if (option.name == name) return option.set(text).message();
     }
     return std::string("no such option");

@@ -733,8 +733,8 @@ TEST_F(Cli, BadInputGetsOneLineAndNoFile) {
 }
 
 TEST_F(Cli, AMalformedCommandLineIsUsage) {
-  expect_refused("", 2, "subcommand");
-  expect_refused("paint", 2, "subcommand");
+  expect_refused("", 2, "which command? There is sample, render");
+  expect_refused("paint", 2, "there is no command 'paint'");
   expect_refused("render", 2, "avatars");
   expect_refused("render P/avatar.fgn --colour red -o x.png", 2, "--colour");
   expect_refused("render P/avatar.fgn --threads 0 -o x.png", 2, "--threads");

@@ -41,10 +41,10 @@ TEST(AvatarCommand, AResumedRunKeepsItsThreadsAndSaysSo) {
   write_stopped_run(folder);
   const ProgramRun resumed = train(folder, "--resume");
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-  EXPECT_NE(resumed.out.find("run: goes on with 1 threads, as it began"), std::string::npos)
-      << resumed.out;
+  EXPECT_NE(resumed.err.find("run: goes on with 1 threads, as it began"), std::string::npos)
+      << resumed.err;
   const ProgramRun finished = train(folder, "--resume");
-  EXPECT_EQ(finished.out.find("goes on"), std::string::npos) << finished.out;
+  EXPECT_EQ(finished.err.find("goes on"), std::string::npos) << finished.err;
 }
 
 TEST(AvatarCommand, ItSaysWhereThreadsAreOthersThanBefore) {
@@ -52,8 +52,8 @@ TEST(AvatarCommand, ItSaysWhereThreadsAreOthersThanBefore) {
   write_stopped_run(folder);
   const ProgramRun resumed = train(folder, "--resume --threads 2 --force-threads");
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-  EXPECT_NE(resumed.out.find("goes on with 2 threads, began with 1"), std::string::npos)
-      << resumed.out;
+  EXPECT_NE(resumed.err.find("goes on with 2 threads, began with 1"), std::string::npos)
+      << resumed.err;
 }
 
 TEST(AvatarCommand, APerceptualNetworkIsNamedInTheRunWhichGoesOnWithNoOther) {

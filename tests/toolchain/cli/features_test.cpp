@@ -39,13 +39,13 @@ TEST(FeaturesCommand, TrainsANetworkThatCanBeJudged) {
   const ProgramRun trained =
       train(folder, "--population six.fgn --body body.fgn --motion motion.fgn -o f.safetensors");
   ASSERT_EQ(trained.exit_code, 0) << trained.err;
-  EXPECT_NE(trained.out.find("4 iterations"), std::string::npos) << trained.out;
+  EXPECT_NE(trained.err.find("4 iterations"), std::string::npos) << trained.err;
   EXPECT_FALSE(folder.has("f.safetensors.checkpoint"));
   EXPECT_LT(std::filesystem::file_size(folder.path("f.safetensors")), 1'000'000u);
   const ProgramRun again =
       train(folder, "--population six.fgn --body body.fgn -o f.safetensors --resume");
   EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_NE(again.out.find("was finished"), std::string::npos) << again.out;
+  EXPECT_NE(again.err.find("was finished"), std::string::npos) << again.err;
 
   const ProgramRun judged = judge(folder, "six.fgn --body body.fgn --features f.safetensors");
   ASSERT_EQ(judged.exit_code, 0) << judged.err;

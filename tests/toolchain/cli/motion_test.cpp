@@ -41,7 +41,7 @@ TEST(MotionCommand, AnEmoteBecomesAPackageThatSaysWhereItIsFrom) {
   write_body(folder);
   const ProgramRun run = motion(folder, "'" + emote("walk.glb") + "' --fps 24");
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_NE(run.out.find("25 frames at 24 a second"), std::string::npos) << run.out;
+  EXPECT_NE(run.err.find("25 frames at 24 a second"), std::string::npos) << run.err;
   const auto file = ports::MappedFile::open(folder.path("motion.fgn"));
   ASSERT_TRUE(file.ok());
   const auto package = Package::open(file->bytes(), "motion.fgn");
