@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "samples/common/html_page.h"
 #include "samples/figurine/svg_plot.h"
 
 namespace figurine::samples {
@@ -12,31 +13,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+// Beside the pages' own.
 constexpr const char* kStyle = R"css(
-:root { --paper: #fbfbf9; --ink: #1d2125; --soft: #667079; --line: #dcdfe1; --card: #ffffff;
-        --accent: #b5432a; --blue: #2b6a99; }
-@media (prefers-color-scheme: dark) {
-  :root { --paper: #16181b; --ink: #e8e9ea; --soft: #98a1a9; --line: #33383d; --card: #1d2024;
-          --accent: #f08a6b; --blue: #7db9e3; }
-}
-* { box-sizing: border-box; }
-body { margin: 0 auto; max-width: 1180px; padding: 40px 28px 64px; background: var(--paper);
-       color: var(--ink);
-       font: 15px/1.55 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
-h1 { font-size: 26px; font-weight: 650; margin: 0 0 4px; letter-spacing: -0.01em; }
-h2 { font-size: 18px; font-weight: 650; margin: 44px 0 6px; }
-p { max-width: 78ch; margin: 6px 0 14px; }
-.soft, .facts dt { color: var(--soft); }
-.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(190px, 1fr));
-         gap: 14px 28px; margin: 22px 0 8px; padding: 16px 20px;
-         background: var(--card); border: 1px solid var(--line); border-radius: 8px; }
-.facts dt { font-size: 12.5px; }
-.facts dd { margin: 0; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(430px, 1fr)); gap: 18px; }
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(430px, 100%), 1fr));
+         gap: 18px; }
 .words { padding: 18px 8px; align-self: center; }
-figure { margin: 0; padding: 14px 14px 8px; background: var(--card);
-         border: 1px solid var(--line); border-radius: 8px; }
-figcaption { font-size: 13px; color: var(--soft); padding: 4px 4px 6px; }
 svg { width: 100%; height: auto; display: block; font-family: inherit; }
 svg .grid { stroke: var(--line); stroke-width: 1; }
 svg .tick { fill: var(--soft); font-size: 12px; } svg .axis { fill: var(--ink); font-size: 13px; }
@@ -47,40 +28,13 @@ svg .label { fill: var(--ink); font-size: 12px; }
 svg .strong { fill: var(--accent); font-weight: 650; }
 svg .theory { stroke: var(--soft); stroke-width: 1.3; stroke-dasharray: 5 4; }
 svg .note { fill: var(--soft); font-size: 12px; }
-table { border-collapse: collapse; width: 100%; margin: 18px 0;
-        font-variant-numeric: tabular-nums; }
-th { text-align: right; font-weight: 600; font-size: 13px; color: var(--soft);
-     border-bottom: 1.5px solid var(--line); padding: 6px 10px; }
-td { text-align: right; border-bottom: 1px solid var(--line); padding: 6px 10px; }
-th:first-child, td:first-child { text-align: left; }
 tr.default td { color: var(--accent); font-weight: 600; }
-.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(200px, 1fr)); gap: 18px; }
-.pictures img { width: 100%; display: block; border-radius: 4px; }
 )css";
 
 std::string formatted(const char* pattern, double value) {
   char text[64];
   std::snprintf(text, sizeof(text), pattern, value);
   return text;
-}
-
-std::string base64(const std::vector<std::byte>& bytes) {
-  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t group = 0;
-    for (size_t k = 0; k < 3; ++k)
-      group = group << 8 | (i + k < bytes.size() ? static_cast<uint32_t>(bytes[i + k]) : 0);
-    for (size_t k = 0; k < 4; ++k)
-      text +=
-          k <= std::min<size_t>(3, bytes.size() - i) ? kDigits[group >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
-std::string fact(const std::string& name, const std::string& value) {
-  return "<div><dt>" + escape_html(name) + "</dt><dd>" + escape_html(value) + "</dd></div>\n";
 }
 
 std::string capitalised(std::string text) {
@@ -152,7 +106,8 @@ std::string plots_of(const Json& dial) {
 
 std::string table_of(const Json& dial) {
   const bool of_frames = blends_are_counted(dial);
-  std::string html = "<table><tr><th>" + escape_html(dial["name"].get<std::string>()) +
+  std::string html = "<div class=\"wide\"><table><tr><th>" +
+                     escape_html(dial["name"].get<std::string>()) +
                      "</th><th>PSNR, dB</th><th>rms error</th><th>largest</th><th>observed "
                      "order</th><th>its stages, ms</th><th>p90, ms</th>" +
                      (of_frames ? "<th>whole frame, ms</th><th>blends</th><th>pairs</th>" : "") +
@@ -175,7 +130,7 @@ std::string table_of(const Json& dial) {
     html += cell(formatted("%.3f", work["macs"].get<double>() * 1e-9));
     html += "</tr>\n";
   }
-  return html + "</table>\n";
+  return html + "</table></div>\n";
 }
 
 }  // namespace
@@ -186,31 +141,27 @@ std::string report_html(const Json& report, const std::vector<ReportPicture>& pi
   const auto text = [](const Json& value) {
     return value.is_string() ? value.get<std::string>() : value.dump();
   };
-  std::string html =
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width\">";
-  html += "<title>figurine: error against run time</title><style>" + std::string(kStyle) +
-          "</style></head><body>\n";
-  html += "<h1>Error against run time</h1>\n<p class=\"soft\">What each dial of the " +
-          std::string(of_sampler ? "sampler" : "renderer") +
-          " costs in quality and saves in time, for one " + (of_sampler ? "package" : "avatar") +
-          ".</p>\n";
+  std::string html = "<h1>Error against run time</h1>\n<p class=\"soft\">What each dial of the " +
+                     std::string(of_sampler ? "sampler" : "renderer") +
+                     " costs in quality and saves in time, for one " +
+                     (of_sampler ? "package" : "avatar") + ".</p>\n";
   html += "<dl class=\"facts\">\n";
   const std::string size = text(report["size"][0]) + " x " + text(report["size"][1]);
   if (of_sampler) {
-    html += fact("Sampler", text(report["sampler"])) +
-            fact("People", text(report["seeds"]) + " seeds, pictures of " + size);
+    html += html_fact("Sampler", text(report["sampler"])) +
+            html_fact("People", text(report["seeds"]) + " seeds, pictures of " + size);
   } else {
-    html += fact("Avatar", text(report["avatar"]));
-    html += fact("Motion",
-                 report["motion"].is_null() ? "golden pose, swaying" : text(report["motion"]));
-    html += fact("Frames", text(report["frames"]) + " of " + size);
+    html += html_fact("Avatar", text(report["avatar"]));
+    html += html_fact("Motion",
+                      report["motion"].is_null() ? "golden pose, swaying" : text(report["motion"]));
+    html += html_fact("Frames", text(report["frames"]) + " of " + size);
   }
-  html += fact("CPU", text(machine["cpu"])) +
-          fact("Threads", text(machine["threads"]) + " on " + text(machine["cpus"]) + " CPUs");
-  html += fact("Arithmetic", text(machine["precision"]) + ", " + text(machine["isa"]) + " kernels");
-  html += fact("Made", text(report["date"])) + fact("By", "figurine " + text(report["version"])) +
-          "</dl>\n";
+  html += html_fact("CPU", text(machine["cpu"])) +
+          html_fact("Threads", text(machine["threads"]) + " on " + text(machine["cpus"]) + " CPUs");
+  html += html_fact("Arithmetic",
+                    text(machine["precision"]) + ", " + text(machine["isa"]) + " kernels");
+  html += html_fact("Made", text(report["date"])) +
+          html_fact("By", "figurine " + text(report["version"])) + "</dl>\n";
   for (const Json& dial : report["dials"]) {
     html += "<h2>" + escape_html(capitalised(text(dial["name"]))) + "</h2>\n<p>" +
             escape_html(capitalised(text(dial["meaning"]))) + ".</p>\n";
@@ -222,9 +173,7 @@ std::string report_html(const Json& report, const std::vector<ReportPicture>& pi
                                    : "The middle frame. Differences are shown around mid-grey.") +
             "</p>\n<div class=\"pictures\">\n";
     for (const ReportPicture& picture : pictures) {
-      html += "<figure><img alt=\"" + escape_html(picture.caption) +
-              "\" src=\"data:image/png;base64," + base64(picture.png) + "\"><figcaption>" +
-              escape_html(picture.caption) + "</figcaption></figure>\n";
+      html += html_figure(picture.png, picture.caption);
     }
     html += "</div>\n";
   }
@@ -233,8 +182,8 @@ std::string report_html(const Json& report, const std::vector<ReportPicture>& pi
           escape_html(text(report["metric"])) + ".</p>\n<p><b>Time:</b> " +
           escape_html(text(report["timing"])) +
           ".</p>\n<p class=\"soft\">The same figures, and all stages, are in report.json beside "
-          "this page.</p>\n</body></html>\n";
-  return html;
+          "this page.</p>\n";
+  return html_page("figurine: error against run time", html, kStyle);
 }
 
 }  // namespace figurine::samples

@@ -16,6 +16,7 @@
 #include "ports/host/process.h"
 #include "samples/common/device_options.h"
 #include "samples/common/file_sink.h"
+#include "samples/common/golden_picture.h"
 #include "samples/common/loading.h"
 #include "samples/common/machine.h"
 #include "samples/common/progress.h"
@@ -35,30 +36,6 @@ struct SampleOptions {
   DeviceOptions device;
   RendererOptions renderer;  // that they ask for
 };
-
-// A person in the golden pose, as the golden camera sees it.
-struct GoldenPicture {
-  RenderedFrame frame;
-  uint64_t memory_bytes = 0;  // of the renderer
-};
-
-Result<GoldenPicture> draw(const Avatar& avatar, const Package& body, Precision precision,
-                           const RendererOptions& options) {
-  Result<std::unique_ptr<Renderer>> renderer = Renderer::create(options);
-  if (!renderer.ok()) return renderer.status();
-  const Result<AvatarId> id = (*renderer)->add_avatar(avatar, body, precision);
-  if (!id.ok()) return id.status();
-  const GoldenFrame& golden = avatar.golden;
-  GoldenPicture picture{
-      RenderedFrame({golden.camera.width_px, golden.camera.height_px}, PixelFormat::kRgba8), 0};
-  const FrameAvatar posed[] = {
-      {.avatar = *id, .pose = {golden.root_translation_m, golden.rotations}}};
-  FIG_RETURN_IF_ERROR((*renderer)->render(
-      {.camera = golden.camera, .avatars = posed, .background = golden.background},
-      picture.frame.target()));
-  picture.memory_bytes = (*renderer)->memory_bytes();
-  return picture;
-}
 
 // Draws what the denoiser believes in after every step: one picture each, and all of them in a
 // strip. Nothing is there before all is.
@@ -84,7 +61,7 @@ class Strip final : public AvatarSampler::Trace {
   Status after_step(uint32_t step, double, const SampledAvatar& avatar) override {
     FIG_RETURN_IF_ERROR(check_interrupt());
     const Result<GoldenPicture> picture =
-        draw(avatar.avatar(), *body_, Precision::kFixedPoint, renderer_);
+        draw_golden_picture(avatar.avatar(), *body_, Precision::kFixedPoint, renderer_);
     if (!picture.ok()) return picture.status();
     sheet_.offer(step - 1, picture->frame.u8);
     return sink_->add(picture->frame, step - 1);
@@ -146,9 +123,9 @@ std::string default_name(const Sampler& sampler, const SampleRequest& request) {
 Result<std::vector<std::byte>> pack(const SampleOptions& options, const LoadedPackage& sampler,
                                     const Package& body, Avatar avatar) {
   // On one thread, however many there are: the memory that the package states depends on them.
-  const Result<GoldenPicture> picture =
-      draw(avatar, body, options.precision == "f32" ? Precision::kFloat32 : Precision::kFixedPoint,
-           {.threads = 1, .isa = options.renderer.isa});
+  const Result<GoldenPicture> picture = draw_golden_picture(
+      avatar, body, options.precision == "f32" ? Precision::kFloat32 : Precision::kFixedPoint,
+      {.threads = 1, .isa = options.renderer.isa});
   if (!picture.ok()) return picture.status();
   if (options.precision != "f32") {
     avatar.golden.fixed_point_hash = hash_picture(picture->frame.u8.pixels);
@@ -192,8 +169,8 @@ struct Sampled {
                             // pages included
 };
 
-Status print_summary(const SampleOptions& options, const Sampler& from, const AvatarSampler& sampler,
-                   const Sampled& sampled) {
+Status print_summary(const SampleOptions& options, const Sampler& from,
+                     const AvatarSampler& sampler, const Sampled& sampled) {
   const uint32_t evaluations = steps_of(options.request, from);
   ports::say(std::format("{}: {}, {} evaluations in {:.2f} s, weights {}", options.output,
                          sampled.name, evaluations, sampled.sample_s, format_hash(sampled.hash)));
@@ -263,14 +240,13 @@ Status run_sample(SampleOptions options) {
   const auto seconds = [](uint64_t from_ns, uint64_t to_ns) {
     return static_cast<double>(to_ns - from_ns) * 1e-9;
   };
-  return print_summary(
-      options, from, **sampler,
-      {.name = avatar.name,
-       .hash = hash_weights(avatar.fixed_point, avatar.shape, avatar.static_part),
-       .size_bytes = bytes->size(),
-       .open_s = seconds(start_ns, loaded_ns),
-       .sample_s = seconds(loaded_ns, sampled_ns),
-       .peak_bytes = peak_bytes});
+  return print_summary(options, from, **sampler,
+                       {.name = avatar.name,
+                        .hash = hash_weights(avatar.fixed_point, avatar.shape, avatar.static_part),
+                        .size_bytes = bytes->size(),
+                        .open_s = seconds(start_ns, loaded_ns),
+                        .sample_s = seconds(loaded_ns, sampled_ns),
+                        .peak_bytes = peak_bytes});
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "samples/common/html_page.h"
+
 namespace figurine::samples {
 
 namespace {
@@ -85,32 +87,6 @@ std::string format(const char* pattern, Values... values) {
 }
 
 }  // namespace
-
-std::string escape_html(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      case '\'':
-        result += "&#39;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
-}
 
 std::string svg_plot(const Plot& plot) {
   const auto drawable = [](const PlotAxis& axis, double value) {

@@ -31,7 +31,4 @@ struct Plot {
 
 std::string svg_plot(const Plot& plot);
 
-// Text with the five characters that HTML reserves replaced.
-std::string escape_html(const std::string& text);
-
 }  // namespace figurine::samples
