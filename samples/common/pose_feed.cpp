@@ -8,11 +8,13 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "samples/common/pose_record.h"
+
 namespace figurine::samples {
 
 namespace {
 
-constexpr uint64_t kMostSaid = 10;  // malformed lines
+constexpr uint64_t kMostSaid = 10;  // malformed poses
 constexpr int kLook_ms = 100;       // how soon the thread sees that it shall end
 
 }  // namespace
@@ -56,7 +58,7 @@ void LineFeed::run() {
   at_end_ = true;
 }
 
-// Waits a little for bytes and takes the lines that are whole; false at the end.
+// Waits a little for bytes and takes the poses that are whole; false at the end.
 bool LineFeed::read_some(std::string& rest) {
   const auto broke = [&] {
     const std::lock_guard lock(mutex_);
@@ -71,37 +73,81 @@ bool LineFeed::read_some(std::string& rest) {
   const ssize_t count = ::read(options_.descriptor, bytes, sizeof(bytes));
   if (count < 0) return errno == EINTR || errno == EAGAIN ? true : broke();
   rest.append(bytes, static_cast<size_t>(count));
-  take_lines(rest, count == 0);
+  take_all(rest, count == 0);
   return count > 0;
 }
 
-// The line that the end cuts off is a line too.
-void LineFeed::take_lines(std::string& rest, bool at_end) {
+void LineFeed::take_all(std::string& rest, bool at_end) {
   size_t begin = 0;
-  for (size_t end = 0; (end = rest.find('\n', begin)) != std::string::npos; begin = end + 1) {
-    if (!skipping_) take_line(std::string_view(rest).substr(begin, end - begin));
-    skipping_ = false;
+  while (begin < rest.size()) {
+    const size_t taken = take_first(std::string_view(rest).substr(begin), at_end);
+    if (taken == 0) break;
+    begin += taken;
   }
   rest.erase(0, begin);
-  if (at_end && !skipping_) take_line(rest);
-  if (rest.size() > kLongestLine) {
-    if (!skipping_) take_line(rest);
-    skipping_ = true;
-    rest.clear();
+}
+
+// Of what is left: how many bytes were taken; 0: more have to come.
+size_t LineFeed::take_first(std::string_view left, bool at_end) {
+  if (skipping_) return skip(left);
+  if (left[0] == kPoseRecordMagic[0]) return take_record(left, at_end);
+  const size_t end = left.find('\n');
+  if (end != std::string_view::npos) {
+    take_line(left.substr(0, end));
+    return end + 1;
   }
+  if (!at_end && left.size() <= kLongestLine) return 0;
+  take_line(left);  // what the end cuts off is a line too
+  skipping_ = !at_end;
+  return left.size();
+}
+
+size_t LineFeed::skip(std::string_view left) {
+  const size_t line = left.find('\n'), record = left.find(kPoseRecordMagic);
+  if (line == std::string_view::npos && record == std::string_view::npos) {
+    // But for what may be the beginning of the next record.
+    const size_t kept = std::min(left.size(), kPoseRecordMagic.size() - 1);
+    return left.size() - kept;
+  }
+  skipping_ = false;
+  return line < record ? line + 1 : record;
+}
+
+size_t LineFeed::take_record(std::string_view left, bool at_end) {
+  const std::optional<size_t> size = pose_record_bytes(left);
+  if (size && left.size() < *size && !at_end) return 0;
+  const bool whole = size && left.size() >= *size;
+  const std::string_view record = left.substr(0, whole ? *size : left.size());
+  take_pose(records_, "record", [&](const Skeleton& skeleton, const std::string& where) {
+    if (size && !whole)
+      return Result<StoredPose>(
+          Status(StatusCode::kInvalidArgument, where + ": the stream ends inside it"));
+    return parse_pose_record(record, skeleton.joint_names.size(), where);
+  });
+  if (size) return record.size();
+  skipping_ = true;
+  return 1;  // past its beginning
 }
 
 void LineFeed::take_line(std::string_view line) {
   if (line.find_first_not_of(" \t\r") == std::string_view::npos) return;
+  take_pose(lines_, "line", [&](const Skeleton& skeleton, const std::string& where) {
+    if (line.size() > kLongestLine)
+      return Result<StoredPose>(
+          Status(StatusCode::kLimitExceeded, where + ": longer than a mebibyte"));
+    return parse_pose_json(line, skeleton.joint_names, where);
+  });
+}
+
+// count: of what it is one of. Counted with its pose, so that who sees it counted can see what it
+// said.
+void LineFeed::take_pose(uint64_t& count, const char* what, const Parse& parse) {
   const uint64_t now_ns = options_.now_ns();
-  // Counted with its pose, below, so that who sees a line counted can see what it said.
-  const std::string where = options_.name + ": line " + std::to_string(lines_ + 1);
+  const std::string where = options_.name + ": " + what + " " + std::to_string(count + 1);
   Status wrong;
   std::vector<StoredPose> poses;
-  if (line.size() > kLongestLine)
-    wrong = Status(StatusCode::kLimitExceeded, where + ": longer than a mebibyte");
   for (size_t s = 0; s < skeletons_.size() && wrong.ok(); ++s) {
-    Result<StoredPose> pose = parse_pose_json(line, skeletons_[s]->joint_names, where);
+    Result<StoredPose> pose = parse(*skeletons_[s], where);
     if (pose.ok()) {
       poses.push_back(std::move(*pose));
     } else {
@@ -111,7 +157,7 @@ void LineFeed::take_line(std::string_view line) {
   uint64_t malformed = 0;
   {
     const std::lock_guard lock(mutex_);
-    ++lines_;
+    ++count;
     if (wrong.ok()) {
       for (size_t s = 0; s < poses.size(); ++s) skeletons_[s]->newest = std::move(poses[s]);
       newest_ns_ = now_ns;
@@ -141,13 +187,15 @@ Status LineFeed::advance(uint64_t) {
 
 nlohmann::ordered_json LineFeed::counts() const {
   const std::lock_guard lock(mutex_);
-  return {{"lines", lines_}, {"poses", poses_}, {"malformed", malformed_}};
+  return {{"lines", lines_}, {"records", records_}, {"poses", poses_}, {"malformed", malformed_}};
 }
 
 std::string LineFeed::summary() const {
   const std::lock_guard lock(mutex_);
-  return std::to_string(poses_) + " poses in " + std::to_string(lines_) + " lines, " +
-         std::to_string(malformed_) + " malformed";
+  std::string in = std::to_string(lines_) + " lines";
+  if (records_ > 0) in = (lines_ > 0 ? in + " and " : "") + std::to_string(records_) + " records";
+  return std::to_string(poses_) + " poses in " + in + ", " + std::to_string(malformed_) +
+         " malformed";
 }
 
 }  // namespace figurine::samples

@@ -2,7 +2,7 @@
 // by a thread of its own so that the moment of arrival is known. The loop that draws asks once a
 // frame for what is newest; what came between two frames is not shown.
 //
-// Here: a line of JSON a pose. From a performer over the network: vmc_feed.h.
+// Here: a line of JSON a pose, or a record of bytes. From a performer over the network: vmc_feed.h.
 #pragma once
 
 #include <atomic>
@@ -48,9 +48,10 @@ class PoseFeed {
   PoseFeed() = default;
 };
 
-// Lines of JSON (pose_json.h) from a descriptor, each a whole pose for every figure. A line that is
-// no pose is counted and said, the first ten of them, and the pose before it stays; a line of
-// nothing but blanks is none.
+// Lines of JSON (pose_json.h) and records (pose_record.h) from a descriptor, mixed as they come,
+// each a whole pose for every figure. What is no pose is counted and said, the first ten of them,
+// and the pose before it stays; a line of nothing but blanks is none. Behind what cannot be read on
+// from (a line too long, a record that is none), the next end of a line or record begins anew.
 class LineFeed final : public PoseFeed {
  public:
   static constexpr size_t kLongestLine = 1 << 20;  // bytes; longer ones are no poses
@@ -80,20 +81,25 @@ class LineFeed final : public PoseFeed {
   };
   void run();
   bool read_some(std::string& rest);
-  void take_lines(std::string& rest, bool at_end);
+  void take_all(std::string& rest, bool at_end);
+  size_t take_first(std::string_view left, bool at_end);
+  size_t skip(std::string_view left);
+  size_t take_record(std::string_view left, bool at_end);
   void take_line(std::string_view line);
+  using Parse = std::function<Result<StoredPose>(const Skeleton&, const std::string& where)>;
+  void take_pose(uint64_t& count, const char* what, const Parse& parse);
 
   Options options_;
   std::vector<std::unique_ptr<Skeleton>> skeletons_;
   std::optional<uint64_t> shown_ns_;
   bool ended_ = false;
-  bool skipping_ = false;  // inside a line that is too long
+  bool skipping_ = false;  // inside what cannot be read
 
   mutable std::mutex mutex_;  // of all that follows, and of Skeleton::newest
   std::optional<uint64_t> newest_ns_;
   bool at_end_ = false;
   Status broken_;
-  uint64_t lines_ = 0, poses_ = 0, malformed_ = 0;
+  uint64_t lines_ = 0, records_ = 0, poses_ = 0, malformed_ = 0;
 
   std::atomic<bool> stop_{false};
   std::thread thread_;

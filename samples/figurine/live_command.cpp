@@ -237,7 +237,8 @@ Command add_live_command(CLI::App& app) {
   command
       ->add_option("--pose", options->pose,
                    "a motion (.fgn), again and again; a pose file (.json); vmc://:39539, a "
-                   "performer over UDP; or -, a line of JSON a pose (docs/poses.md)")
+                   "performer over UDP; or -, a line of JSON or a record of bytes a pose "
+                   "(docs/poses.md)")
       ->required();
   command
       ->add_option(

@@ -7,10 +7,12 @@
 
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <thread>
 #include <vector>
 
 #include "ports/host/clock.h"
+#include "samples/common/pose_record.h"
 
 namespace figurine::samples::pose_feed_test {
 namespace {
@@ -62,6 +64,10 @@ struct Stream {
     while (feed->counts()["lines"].get<uint64_t>() < lines)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
+  void wait_for(const char* what, uint64_t count) const {
+    while (feed->counts()[what].get<uint64_t>() < count)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
   std::vector<float> shown() const {
     EXPECT_TRUE(feed->advance(0).ok());
     const PoseView pose = source->next(0).value();
@@ -85,7 +91,7 @@ TEST(LineFeed, GivesTheNewestSoundPose) {
   EXPECT_EQ(stream.shown(), (std::vector<float>{0, 0, 0, 1, 1, 0, 0, 0}))
       << "each line is a whole pose, and a wrong one changes nothing";
   EXPECT_EQ(stream.feed->counts(),
-            nlohmann::ordered_json({{"lines", 4}, {"poses", 3}, {"malformed", 1}}));
+            nlohmann::ordered_json({{"lines", 4}, {"records", 0}, {"poses", 3}, {"malformed", 1}}));
   ASSERT_EQ(said.size(), 1u);
   EXPECT_EQ(said[0].rfind("stream: line 4: joint 'tail'", 0), 0u) << said[0];
 }
@@ -126,6 +132,87 @@ TEST(LineFeed, ALineWithoutEndTakesNoMemory) {
   EXPECT_EQ(stream.feed->counts()["malformed"], 1);
   const std::lock_guard lock(said_mutex);
   EXPECT_EQ(said, std::vector<std::string>{"stream: line 1: longer than a mebibyte"});
+}
+
+std::string record(const std::vector<float>& rotations, std::array<float, 3> root = {0, 0, 0}) {
+  const std::vector<std::byte> bytes = write_pose_record({root, rotations});
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+TEST(LineFeed, TakesRecordsAndLinesAsTheyCome) {
+  const Stream stream;
+  const std::vector<float> first = {0.6f, 0.8f, 0, 0, 1, 0, 0, 1e-30f},
+                           second = {1, 2, 3, 4, 0, 0, 0, 1};
+  stream.write(record(first, {0.1f, -0.0f, 3}));
+  stream.wait_for("records", 1);
+  EXPECT_EQ(stream.shown(), first) << "to the bit";
+  stream.write("{\"joints\": {\"head\": [0, 1, 0, 0]}}\n" + record(second).substr(0, 5));
+  stream.wait_for_lines(1);
+  EXPECT_EQ(stream.shown()[5], 1);
+  stream.write(record(second).substr(5));
+  stream.wait_for("records", 2);
+  EXPECT_EQ(stream.shown(), second);
+  EXPECT_EQ(stream.feed->counts(),
+            nlohmann::ordered_json({{"lines", 1}, {"records", 2}, {"poses", 3}, {"malformed", 0}}));
+  EXPECT_EQ(stream.feed->summary(), "3 poses in 1 lines and 2 records, 0 malformed");
+}
+
+TEST(LineFeed, ReadsOnBehindARecordThatIsNone) {
+  const Stream stream;
+  const std::vector<float> pose = {0, 1, 0, 0, 0, 0, 1, 0};
+  std::string version = record(pose), joints = record(pose), length = record(pose),
+              nan = record(pose), zero = record({0, 0, 0, 0, 1, 0, 0, 0});
+  version[8] = 2, joints[10] = 3, length[6] = 1;
+  nan.replace(24, 4, std::string("\0\0\xc0\x7f", 4));
+  uint64_t records = 0;
+  for (const auto& [wrong, said_of_it] :
+       {std::pair(version, "version 2 is not known, 1 is"),
+        std::pair(joints, "3 joints: the body has 2"), std::pair(length, "no pose record"),
+        std::pair(nan, "the rotation of joint 0 is zero or not finite"),
+        std::pair(zero, "the rotation of joint 0 is zero or not finite"),
+        std::pair(record({1, 0, 0, 0}), "1 joints: the body has 2"),
+        std::pair(record(pose, {0, 20000, 0}), "root_translation_m: "),
+        std::pair(std::string("\x8FPNG and what not"), "no pose record")}) {
+    const std::vector<float> turned = {1, static_cast<float>(records), 0, 0, 1, 0, 0, 0};
+    stream.write(wrong + record(turned));
+    records += 2;
+    stream.wait_for("records", records);
+    EXPECT_EQ(stream.shown(), turned) << said_of_it;
+    const std::lock_guard lock(said_mutex);
+    ASSERT_EQ(said.size(), records / 2);
+    EXPECT_EQ(said.back().rfind("stream: record " + std::to_string(records - 1) + ": ", 0), 0u);
+    EXPECT_NE(said.back().find(said_of_it), std::string::npos) << said.back();
+  }
+}
+
+TEST(LineFeed, ARecordThatTheEndCutsIsNoPose) {
+  Stream stream;
+  stream.write(record({0, 1, 0, 0, 1, 0, 0, 0}) + record({1, 0, 0, 0, 1, 0, 0, 0}).substr(0, 30));
+  stream.close_write();
+  stream.wait_for("records", 2);
+  EXPECT_EQ(stream.shown()[1], 1);
+  const std::lock_guard lock(said_mutex);
+  EXPECT_EQ(said, std::vector<std::string>{"stream: record 2: the stream ends inside it"});
+}
+
+// Whatever bytes come: no crash, bounded memory, and a sound pose behind them is shown.
+TEST(LineFeed, AnyBytesAreSurvived) {
+  const Stream stream;
+  const std::string whole = record({0, 1, 0, 0, 0, 0, 1, 0});
+  std::mt19937 random(7);
+  for (int i = 0; i < 3000; ++i) {
+    std::string bytes = whole.substr(0, random() % (whole.size() + 1));
+    for (int flips = static_cast<int>(random() % 4); flips > 0 && !bytes.empty(); --flips)
+      bytes[random() % bytes.size()] = static_cast<char>(random());
+    stream.write(bytes);
+  }
+  stream.write(std::string(kMostPoseRecord, '\n'));  // past whatever was begun
+  const std::vector<float> last = {0.5f, 0.5f, 0.5f, 0.5f, 1, 0, 0, 0};
+  for (int i = 0; i < 5000 && stream.shown() != last; ++i) {
+    stream.write(record(last));
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(stream.shown(), last);
 }
 
 TEST(LineFeed, SaysThatTheStreamBroke) {

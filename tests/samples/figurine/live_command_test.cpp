@@ -119,7 +119,7 @@ TEST_F(LiveCommand, LinesOfBothKindsMoveTheFigure) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json said = json();
   EXPECT_EQ(said["ended_by"], "poses");
-  EXPECT_EQ(said["poses"], Json({{"lines", 3}, {"poses", 2}, {"malformed", 1}}));
+  EXPECT_EQ(said["poses"], Json({{"lines", 3}, {"records", 0}, {"poses", 2}, {"malformed", 1}}));
   EXPECT_NE(result.err.find("standard input: line 2: pose: "), std::string::npos) << result.err;
   EXPECT_EQ(result.error_lines(), 2u) << result.err;
   EXPECT_LE(said["latency_ms"]["count"], 2);
@@ -128,6 +128,35 @@ TEST_F(LiveCommand, LinesOfBothKindsMoveTheFigure) {
   got.erase(std::unique(got.begin(), got.end()), got.end());
   EXPECT_GE(got.size(), 2u) << "the pictures of two poses, after that of rest if it came first";
   EXPECT_LE(got.size(), 3u);
+}
+
+TEST_F(LiveCommand, ARecordDrawsWhatItsMotionsFrameDoes) {
+  const auto render = [&](const std::string& more) {
+    const ProgramRun drawn =
+        run_figurine("render avatar.fgn --size 32x32 --motion motion.fgn --frames 7 " + more,
+                     {.folder = folder_.path()});
+    ASSERT_EQ(drawn.exit_code, 0) << drawn.err;
+    if (!drawn.out.empty()) {
+      folder_.write("camera.json", Json::parse(drawn.out)["camera"].dump());
+    }
+  };
+  render("--json -o first.png");
+  render("--camera camera.json --background '#dbe0e6' -o still.y4m");
+  const ProgramRun result = shell(
+      "(printf '\\217POS too little'; '" FIGURINE_POSE_SEND
+      "' motion.fgn --frame 3; '" FIGURINE_POSE_SEND
+      "' motion.fgn --frame 7; sleep 1) | \"$figurine\" live avatar.fgn "
+      "--threads 1 --size 32x32 --camera camera.json --pose - --fps 8 --json live.json -o x.y4m");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(json()["ended_by"], "poses");
+  EXPECT_EQ(json()["poses"], Json({{"lines", 0}, {"records", 3}, {"poses", 2}, {"malformed", 1}}));
+  EXPECT_NE(result.err.find("standard input: record 1: no pose record"), std::string::npos)
+      << result.err;
+  const std::string still = folder_.read("still.y4m");
+  const std::vector<std::string> shown = frames(folder_.read("x.y4m"), "8:1");
+  ASSERT_FALSE(shown.empty());
+  ASSERT_GT(still.size(), kFrameBytes);
+  EXPECT_EQ(shown.back(), still.substr(still.size() - kFrameBytes + 6));
 }
 
 TEST_F(LiveCommand, AStreamWithoutAPoseIsAnError) {
