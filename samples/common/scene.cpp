@@ -127,12 +127,20 @@ Status Scene::load_coarse(const SceneOptions& options, size_t index, std::span<c
   if (body.ok() && *body != figure.body) body = body_of(*figure.coarse, "", others);
   if (!body.ok()) return body.status();
   figure.coarse_body = std::move(*body);
-  if (figure.coarse_body->package.body().joint_count() !=
-      figure.body->package.body().joint_count()) {
-    return Status(
-        StatusCode::kInvalidArgument,
-        figure.coarse->name + ": its body's joints are not " + figure.avatar->name + "'s");
-  }
+  return check_coarse(figure, *figure.coarse, *figure.coarse_body);
+}
+
+Status Scene::check_coarse(const Figure& figure, const LoadedAvatar& coarse,
+                           const LoadedPackage& body) {
+  if (body.package.body().joint_count() == figure.body->package.body().joint_count()) return {};
+  return Status(StatusCode::kInvalidArgument,
+                coarse.name + ": its body's joints are not " + figure.avatar->name + "'s");
+}
+
+Status Scene::set_coarse(size_t index, const Coarse& coarse) {
+  Figure& figure = figures_[index];
+  if (coarse.avatar) FIG_RETURN_IF_ERROR(check_coarse(figure, *coarse.avatar, *coarse.body));
+  figure.coarse = coarse.avatar, figure.coarse_body = coarse.body;
   return {};
 }
 
@@ -261,6 +269,7 @@ Status Scene::add_figure_to(Renderer& renderer, size_t index, std::optional<Prec
       renderer.add_avatar(figure.avatar->avatar, figure.body->package, precision);
   if (!id.ok()) return id.status().within(figure.avatar->name);
   posed_[index].avatar = *id;
+  posed_[index].coarse.reset();
   if (!figure.coarse) return {};
   const Result<AvatarId> coarse =
       renderer.add_avatar(figure.coarse->avatar, figure.coarse_body->package);

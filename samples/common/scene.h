@@ -45,9 +45,20 @@ class Scene {
     std::shared_ptr<LoadedPackage> motion;  // null: stands in the golden pose
     Placement place;
   };
+  // Who draws a figure when it is small (FrameAvatar::coarse), with the body; null: nobody.
+  struct Coarse {
+    std::shared_ptr<LoadedAvatar> avatar;
+    std::shared_ptr<LoadedPackage> body;
+  };
   // The last figure from now on, of whom the renderer knows nothing yet (add_to, add_figure_to).
   // kMismatch if the motion does not fit the body; nothing has changed then.
   Status add_figure(const Newcomer& newcomer);
+  // From the next renderer on. kInvalidArgument if its body has other joints; nothing has changed
+  // then.
+  Status set_coarse(size_t figure, const Coarse& coarse);
+  Coarse coarse(size_t figure) const {
+    return {figures_[figure].coarse, figures_[figure].coarse_body};
+  }
   // Those behind it move up. Their renderer is the caller's to tell.
   void remove_figure(size_t figure);
   void swap_figures(size_t a, size_t b);
@@ -69,6 +80,7 @@ class Scene {
   Status add_to(Renderer& renderer, std::optional<Precision> precision);
   Status add_figure_to(Renderer& renderer, size_t figure, std::optional<Precision> precision);
   AvatarId id(size_t figure) const { return posed_[figure].avatar; }  // in the last renderer
+  std::optional<AvatarId> coarse_id(size_t figure) const { return posed_[figure].coarse; }
   // What the avatars run in: "f32", "q8", or "mixed".
   std::string precision(const Renderer& renderer) const;
   // Whether every avatar holds it.
@@ -113,6 +125,8 @@ class Scene {
                               std::span<const Figure> others, Figure& figure);
   static Status load_coarse(const SceneOptions& options, size_t index,
                             std::span<const Figure> others, Figure& figure);
+  static Status check_coarse(const Figure& figure, const LoadedAvatar& coarse,
+                             const LoadedPackage& body);
   void place_figure(size_t figure, const PoseView& pose);
   void find_length();
 

@@ -18,10 +18,10 @@ bool lives_on_earlier_frames(const Settings& settings) {
 }
 
 bool same_figures(const std::vector<StudyFigure>& a, const std::vector<StudyFigure>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](const StudyFigure& x, const StudyFigure& y) {
-                      return x.avatar == y.avatar && x.body == y.body;
-                    });
+  return std::equal(
+      a.begin(), a.end(), b.begin(), b.end(), [](const StudyFigure& x, const StudyFigure& y) {
+        return x.avatar == y.avatar && x.body == y.body && x.coarse.avatar == y.coarse.avatar;
+      });
 }
 
 }  // namespace
@@ -42,7 +42,12 @@ Status ErrorStudy::prepare(const StudyView& view) {
     const Result<AvatarId> id =
         (*renderer)->add_avatar(figure.avatar->avatar, figure.body->package);
     if (!id.ok()) return id.status().within(figure.avatar->name);
-    ids_.push_back(*id);
+    ids_.push_back({.avatar = *id, .pose = {}});
+    if (!figure.coarse.avatar) continue;
+    const Result<AvatarId> coarse =
+        (*renderer)->add_avatar(figure.coarse.avatar->avatar, figure.coarse.body->package);
+    if (!coarse.ok()) return coarse.status().within(figure.coarse.avatar->name);
+    ids_.back().coarse = *coarse;
   }
   renderer_ = std::move(*renderer);
   isa_ = view.isa, figures_ = view.figures;
@@ -58,9 +63,8 @@ Result<ErrorStudy::Frames> ErrorStudy::draw(const StudyView& view, const Setting
   if (view.cloud) gaussians.push_back(view.cloud->view());
   const auto render = [&](size_t moment) -> Result<double> {
     if (cancelled) return Status(StatusCode::kInterrupted, "cancelled");
-    std::vector<FrameAvatar> posed;
-    for (size_t f = 0; f < ids_.size(); ++f)
-      posed.push_back({.avatar = ids_[f], .pose = view.moments[moment][f].view()});
+    std::vector<FrameAvatar> posed = ids_;
+    for (size_t f = 0; f < ids_.size(); ++f) posed[f].pose = view.moments[moment][f].view();
     const uint64_t start_ns = ports::thread_cpu_ns();
     FIG_RETURN_IF_ERROR(renderer_->render(
         {.camera = view.camera,

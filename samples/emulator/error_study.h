@@ -17,6 +17,7 @@
 #include "ports/gaussians/gaussian_cloud.h"
 #include "samples/common/loading.h"
 #include "samples/common/pose_json.h"
+#include "samples/common/scene.h"
 #include "samples/emulator/switches.h"
 
 namespace figurine::emulator {
@@ -24,6 +25,7 @@ namespace figurine::emulator {
 struct StudyFigure {
   std::shared_ptr<samples::LoadedAvatar> avatar;
   std::shared_ptr<samples::LoadedPackage> body;
+  samples::Scene::Coarse coarse;
 };
 
 // A picture to try the switches on; owns all that it needs.
@@ -66,7 +68,7 @@ class ErrorStudy {
   std::unique_ptr<Renderer> renderer_;
   std::optional<Isa> isa_;
   std::vector<StudyFigure> figures_;
-  std::vector<AvatarId> ids_;
+  std::vector<FrameAvatar> ids_;  // their identities; poses are the views'
 };
 
 }  // namespace figurine::emulator

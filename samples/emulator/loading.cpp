@@ -11,19 +11,40 @@ namespace {
 
 constexpr std::byte kPackageBegins{0x8F};  // no text and no file of Gaussians begins so
 
+// Of an avatar; known: that need not be looked for.
+Result<std::shared_ptr<samples::LoadedPackage>> body_of(
+    const samples::LoadedAvatar& avatar,
+    const std::vector<std::shared_ptr<samples::LoadedPackage>>& known) {
+  for (const std::shared_ptr<samples::LoadedPackage>& body : known) {
+    if (body->package.content_hash() != avatar.avatar.body_hash) continue;
+    FIG_RETURN_IF_ERROR(check_avatar_fits_body(avatar.avatar, body->package).within(avatar.name));
+    return body;
+  }
+  Result<std::unique_ptr<samples::LoadedPackage>> body = samples::find_body(avatar, "");
+  if (!body.ok()) return body.status();
+  return std::shared_ptr<samples::LoadedPackage>(std::move(*body));
+}
+
+Status load_coarse(const std::string& path, const LoadWish& wish, Loaded& loaded) {
+  Result<std::unique_ptr<samples::LoadedAvatar>> avatar = samples::load_avatar(path);
+  if (!avatar.ok()) return avatar.status();
+  const Result<std::shared_ptr<samples::LoadedPackage>> body = body_of(**avatar, wish.bodies);
+  if (!body.ok()) return body.status();
+  loaded.coarse = {std::move(*avatar), *body};
+  return {};
+}
+
 Status load_avatar_with_body(const LoadWish& wish, Loaded& loaded) {
   Result<std::unique_ptr<samples::LoadedAvatar>> avatar = samples::load_avatar(wish.path);
   if (!avatar.ok()) return avatar.status();
   loaded.avatar = std::move(*avatar);
-  for (const std::shared_ptr<samples::LoadedPackage>& body : wish.bodies) {
-    if (body->package.content_hash() == loaded.avatar->avatar.body_hash) {
-      loaded.body = body;
-      return check_avatar_fits_body(loaded.avatar->avatar, body->package).within(wish.path);
-    }
-  }
-  Result<std::unique_ptr<samples::LoadedPackage>> body = samples::find_body(*loaded.avatar, "");
+  const Result<std::shared_ptr<samples::LoadedPackage>> body = body_of(*loaded.avatar, wish.bodies);
   if (!body.ok()) return body.status();
-  loaded.body = std::move(*body);
+  loaded.body = *body;
+  const std::string coarse = coarse_name(wish.path);
+  std::error_code error;
+  if (!coarse.empty() && std::filesystem::exists(coarse, error))
+    loaded.coarse_trouble = load_coarse(coarse, wish, loaded);
   return {};
 }
 
@@ -38,6 +59,12 @@ Status load_sampler(std::unique_ptr<samples::LoadedPackage> package, Loaded& loa
 }
 
 }  // namespace
+
+std::string coarse_name(const std::string& path) {
+  constexpr std::string_view kEnding = ".fgn";
+  if (!path.ends_with(kEnding)) return "";
+  return path.substr(0, path.size() - kEnding.size()) + "-coarse.fgn";
+}
 
 Result<Loaded> load_file(const LoadWish& wish) {
   Loaded loaded{.path = wish.path};

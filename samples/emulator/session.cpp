@@ -116,14 +116,37 @@ Status Session::take(const Loaded& loaded) {
 }
 
 Status Session::take_avatar(const Loaded& loaded) {
+  for (size_t i = 0; i < avatars_.size(); ++i) {
+    if (coarse_name(avatars_[i]->name) == loaded.avatar->name && !scene_.coarse(i).avatar)
+      return take_coarse(i, loaded);
+  }
   if (scene_.size() >= kMostFigures) {
     return Status(StatusCode::kLimitExceeded,
                   loaded.path + ": there are " + std::to_string(kMostFigures) + " figures already");
   }
-  FIG_RETURN_IF_ERROR(add_figure(loaded.avatar, loaded.body));
+  FIG_RETURN_IF_ERROR(add_figure(loaded.avatar, loaded.body, loaded.coarse));
   place_figures();
   FIG_RETURN_IF_ERROR(follow_anew());
-  say(file_name(loaded.path) + ": an avatar");
+  say(file_name(loaded.path) + ": an avatar" +
+      (scene_.coarse(scene_.size() - 1).avatar
+           ? ", " + file_name(loaded.coarse.avatar->name) + " for when it is small"
+           : ""));
+  return loaded.coarse_trouble;
+}
+
+// Whose coarse package comes when the figure is there already.
+Status Session::take_coarse(size_t figure, const Loaded& loaded) {
+  FIG_RETURN_IF_ERROR(scene_.set_coarse(figure, {loaded.avatar, loaded.body}));
+  const Status made = make_renderer();
+  if (!made.ok()) {
+    (void)scene_.set_coarse(figure, {});
+    (void)report(make_renderer());
+    return made;
+  }
+  touch();
+  studies_.cancel();
+  find_facts();
+  say(file_name(loaded.path) + ": for when " + file_name(avatars_[figure]->name) + " is small");
   return {};
 }
 
@@ -162,7 +185,8 @@ Status Session::take_motion(const Loaded& loaded) {
 
 // In the motion that there is, if it fits; else in the golden pose, and that is said.
 Status Session::add_figure(const std::shared_ptr<samples::LoadedAvatar>& avatar,
-                           const std::shared_ptr<samples::LoadedPackage>& body) {
+                           const std::shared_ptr<samples::LoadedPackage>& body,
+                           const samples::Scene::Coarse& coarse) {
   samples::Scene::Newcomer newcomer{avatar, body, motion_, {}};
   Status misfit = scene_.add_figure(newcomer);
   if (!misfit.ok()) {
@@ -170,6 +194,7 @@ Status Session::add_figure(const std::shared_ptr<samples::LoadedAvatar>& avatar,
     FIG_RETURN_IF_ERROR(scene_.add_figure(newcomer));
   }
   const size_t index = scene_.size() - 1;
+  (void)report(scene_.set_coarse(index, coarse));  // without it, if it does not fit
   const Status added = scene_.add_figure_to(*renderer_, index, options_.precision);
   if (!added.ok()) {
     scene_.remove_figure(index);
@@ -193,8 +218,7 @@ Status Session::remove_figure(size_t figure) {
     return Status(StatusCode::kNotFound,
                   std::format("figure {}: there are {}", figure + 1, scene_.size()));
   }
-  FIG_RETURN_IF_ERROR(renderer_->remove_avatar(scene_.id(figure)));
-  scene_.remove_figure(figure);
+  FIG_RETURN_IF_ERROR(forget_figure(figure));
   avatars_.erase(avatars_.begin() + static_cast<std::ptrdiff_t>(figure));
   bodies_.erase(bodies_.begin() + static_cast<std::ptrdiff_t>(figure));
   if (person_ && *person_ == figure) {
@@ -211,6 +235,14 @@ Status Session::remove_figure(size_t figure) {
   return scene_.size() > 0 ? follow_anew() : Status();
 }
 
+Status Session::forget_figure(size_t figure) {
+  FIG_RETURN_IF_ERROR(renderer_->remove_avatar(scene_.id(figure)));
+  if (const std::optional<AvatarId> coarse = scene_.coarse_id(figure))
+    FIG_RETURN_IF_ERROR(renderer_->remove_avatar(*coarse));
+  scene_.remove_figure(figure);
+  return {};
+}
+
 void Session::place_figures() {
   for (size_t i = 0; i < scene_.size(); ++i) {
     const float from_middle = static_cast<float>(i) - 0.5f * static_cast<float>(scene_.size() - 1);
@@ -220,8 +252,11 @@ void Session::place_figures() {
 
 void Session::find_facts() {
   facts_.clear();
-  for (size_t i = 0; i < avatars_.size(); ++i)
+  for (size_t i = 0; i < avatars_.size(); ++i) {
     facts_.push_back(facts_of(*avatars_[i], *bodies_[i]));
+    if (const samples::Scene::Coarse coarse = scene_.coarse(i); coarse.avatar)
+      facts_.back().lines.push_back({"When small", file_name(coarse.avatar->name)});
+  }
   if (cloud_) facts_.push_back(facts_of(cloud_path_, *cloud_));
 }
 
@@ -353,6 +388,10 @@ uint64_t Session::memory_bytes() const {
   };
   for (const auto& avatar : avatars_) add(avatar->package.get()), add(avatar->network.get());
   for (const auto& body : bodies_) add(body.get());
+  for (size_t i = 0; i < scene_.size(); ++i) {
+    const samples::Scene::Coarse coarse = scene_.coarse(i);
+    if (coarse.avatar) add(coarse.avatar->package.get()), add(coarse.body.get());
+  }
   add(motion_.get());
   if (sampler_) add(sampler_->package.get());
   if (cloud_) {
@@ -383,7 +422,8 @@ StudyView Session::study_view(const Camera& camera) {
                  .camera = camera,
                  .settings = settings_,
                  .isa = renderer_->isa()};
-  for (size_t i = 0; i < avatars_.size(); ++i) view.figures.push_back({avatars_[i], bodies_[i]});
+  for (size_t i = 0; i < avatars_.size(); ++i)
+    view.figures.push_back({avatars_[i], bodies_[i], scene_.coarse(i)});
   if (view.figures.empty()) return view;
   const auto step = static_cast<uint32_t>(
       std::max(1.0, std::round(timeline_.frames_per_second() / kMomentsPerSecond)));
@@ -454,8 +494,7 @@ Status Session::put_person(const Person* person) {
   scene_.swap_figures(place, last);
   std::swap(avatars_[place], avatars_[last]);
   std::swap(bodies_[place], bodies_[last]);
-  FIG_RETURN_IF_ERROR(renderer_->remove_avatar(scene_.id(last)));
-  scene_.remove_figure(last);
+  FIG_RETURN_IF_ERROR(forget_figure(last));
   avatars_.pop_back();
   bodies_.pop_back();
   place_figures();
@@ -592,8 +631,12 @@ nlohmann::ordered_json Session::json() const {
         {"gain_ms", each.gain_ms}};
   };
   Json figures = Json::array(), said = Json::array(), set = Json::object(), study;
-  for (const auto& avatar : avatars_)
-    figures.push_back({{"file", avatar->name}, {"name", avatar->avatar.name}});
+  for (size_t i = 0; i < avatars_.size(); ++i) {
+    const samples::Scene::Coarse coarse = scene_.coarse(i);
+    figures.push_back({{"file", avatars_[i]->name},
+                       {"name", avatars_[i]->avatar.name},
+                       {"coarse", coarse.avatar ? Json(coarse.avatar->name) : Json()}});
+  }
   for (const Message& message : messages_)
     said.push_back({{"text", message.text}, {"error", message.error}});
   for (const Switch& each : switches()) set[each.name] = each.get(settings_);

@@ -141,12 +141,15 @@ class Session {
   Status load_next();
   Status take(const Loaded& loaded);
   Status take_avatar(const Loaded& loaded);
+  Status take_coarse(size_t figure, const Loaded& loaded);
   Status take_cloud(const Loaded& loaded);
   Status take_motion(const Loaded& loaded);
   Status take_person(const Person& person);
   Status put_person(const Person* person);
   Status add_figure(const std::shared_ptr<samples::LoadedAvatar>& avatar,
-                    const std::shared_ptr<samples::LoadedPackage>& body);
+                    const std::shared_ptr<samples::LoadedPackage>& body,
+                    const samples::Scene::Coarse& coarse = {});
+  Status forget_figure(size_t figure);  // by renderer and scene
   void place_figures();
   void find_facts();
   Status follow_anew();

@@ -55,6 +55,66 @@ TEST_F(Sessions, ABrokenFileIsAMessage) {
   EXPECT_EQ(session_->picture().u8.pixels, before) << "nothing else has changed";
 }
 
+TEST_F(Sessions, ACoarsePackageDrawsAFigureThatIsSmall) {
+  const tests::SyntheticAvatar other =
+      tests::make_test_avatar(tests::make_test_body(), {.seed = 9});  // clearly somebody else
+  const std::string coarse(reinterpret_cast<const char*>(other.bytes.bytes().data()),
+                           other.bytes.bytes().size());
+  packages_->write("figure.fgn", packages_->read("avatar.fgn"));
+  packages_->write("figure-coarse.fgn", coarse);
+  open("figure.fgn");
+  EXPECT_EQ(session_->figure_count(), 1u);
+  EXPECT_EQ(last_message(), "figure.fgn: an avatar, figure-coarse.fgn for when it is small");
+  EXPECT_EQ(session_->json()["figures"][0]["coarse"], packages_->path("figure-coarse.fgn"));
+  ASSERT_TRUE(session_->draw().ok());
+  const std::vector<uint8_t> fine = session_->picture().u8.pixels;
+  EXPECT_EQ(session_->statistics().coarse_avatars, 0u);
+  Settings settings = session_->settings();
+  ASSERT_TRUE(set_switch(settings, "coarse-below-px", "on").ok());
+  session_->set_settings(settings);
+  session_->set_paced(false);
+  ASSERT_TRUE(run_until([&] { return session_->up_to_date(); }));
+  EXPECT_EQ(session_->statistics().coarse_avatars, 1u);
+  EXPECT_NE(session_->picture().u8.pixels, fine);
+  const auto error_of_it = [&] {
+    session_->set_measuring(true);
+    EXPECT_TRUE(run_until([&] { return session_->study_is_current(); }));
+    session_->set_measuring(false);
+    size_t row = 0;
+    while (std::string(switches()[row].name) != "coarse-below-px") ++row;
+    return session_->study()->rows[row];
+  };
+  EXPECT_FALSE(error_of_it().same);
+  EXPECT_GT(error_of_it().error_db, 5);
+  EXPECT_LT(error_of_it().error_db, 60);
+  session_->set_settings({});
+  ASSERT_TRUE(run_until([&] { return session_->up_to_date(); }));
+  EXPECT_EQ(session_->picture().u8.pixels, fine) << "and back";
+  EXPECT_FALSE(error_of_it().same) << "what it would be is measured while it is off";
+
+  // Dropped later, it finds its figure; another figure's is nobody's.
+  ASSERT_TRUE(session_->remove_figure(0).ok());
+  packages_->write("later.fgn", packages_->read("avatar.fgn"));
+  open("later.fgn");
+  EXPECT_TRUE(error_of_it().same) << "there is none";
+  packages_->write("later-coarse.fgn", coarse);
+  open("later-coarse.fgn");
+  EXPECT_EQ(session_->figure_count(), 1u);
+  EXPECT_EQ(last_message(), "later-coarse.fgn: for when later.fgn is small");
+  EXPECT_FALSE(error_of_it().same);
+  open("figure-coarse.fgn");
+  EXPECT_EQ(session_->figure_count(), 2u);
+  ASSERT_TRUE(session_->remove_figure(0).ok());
+  ASSERT_TRUE(session_->remove_figure(0).ok());
+
+  packages_->write("bad.fgn", packages_->read("avatar.fgn"));
+  packages_->write("bad-coarse.fgn", packages_->read("broken.fgn"));
+  open("bad.fgn");
+  EXPECT_EQ(session_->figure_count(), 1u) << "shown all the same";
+  EXPECT_TRUE(last_is_error());
+  EXPECT_NE(last_message().find("bad-coarse.fgn: "), std::string::npos) << last_message();
+}
+
 TEST_F(Sessions, AMotionMovesEverybody) {
   open("avatar.fgn");
   open("motion.fgn");
