@@ -100,7 +100,11 @@ TEST(ThreadsOption, AboveTheUsableCpusIsLoweredWithALineUnlessForced) {
   EXPECT_NE(lowered.err.find("--threads 200: lowered to the " + cpus + " usable"),
             std::string::npos)
       << lowered.err;
-  EXPECT_EQ(std::count(lowered.err.begin(), lowered.err.end(), '\n'), 1) << lowered.err;
+  EXPECT_EQ(lowered.err.find("lowered"), lowered.err.rfind("lowered")) << lowered.err;
+  const ProgramRun quiet = train(folder, "--resume --threads 200 --quiet");
+  EXPECT_EQ(quiet.exit_code, 0) << quiet.err;
+  EXPECT_EQ(std::count(quiet.err.begin(), quiet.err.end(), '\n'), 1)
+      << "a run that is finished goes on with nothing: " << quiet.err;
   for (const char* bad : {"1000", "many", "-1", "1000 --force-threads"})
     EXPECT_EQ(train(folder, std::string("--resume --threads ") + bad).exit_code, 2) << bad;
 }

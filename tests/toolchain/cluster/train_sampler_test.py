@@ -91,8 +91,9 @@ class TrainSampler(unittest.TestCase):
                 f"{between['iterations']} iterations", output)
         self.assertIn("time is up, back into the queue", output)
         self.assertRegex(output, r"start 2: .* --resume\n")
-        self.assertIn(f"0: {self.folder / 'run'}: {run['iterations']} iterations in", output)
-        self.assertNotIn(f"1: {self.folder / 'run'}: {run['iterations']} iterations in", output)
+        said = f"figurine-train: {self.folder / 'run'}: {run['iterations']} iterations in"
+        self.assertIn(f"0: {said}", output)
+        self.assertNotIn(f"1: {said}", output)
         self.assertTrue((self.folder / "run" / "weights.safetensors").exists())
 
     def test_ends_with_one_line_a_rank_when_a_rank_dies(self):
