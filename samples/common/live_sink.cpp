@@ -12,16 +12,19 @@ LiveSink::LiveSink(const Options& options)
 }
 
 bool LiveSink::drop_late(uint64_t due_ns) {
-  if (now_ns() < next_due_ns(due_ns)) return false;
+  if (now_ns() < due_ns + interval_ns_) return false;
   ++counts_.dropped;
   return true;
 }
 
 Result<bool> LiveSink::show(const RenderedFrame& frame, uint64_t due_ns) {
   FIG_CHECK(frame.format == format(), "frames of the sink's format");
-  if (drop_late(due_ns)) return false;
-  const Result<bool> shown = put(frame, next_due_ns(due_ns));
-  if (shown.ok()) ++(*shown ? counts_.shown : counts_.dropped);
+  const uint64_t now = now_ns();
+  const uint64_t passed = now < due_ns ? 0 : (now - due_ns) / interval_ns_;
+  const Result<bool> shown = put(frame, due_ns + (passed + 1) * interval_ns_);
+  if (!shown.ok()) return shown;
+  ++(*shown ? counts_.shown : counts_.dropped);
+  if (*shown && passed > 0) ++counts_.late;
   return shown;
 }
 

@@ -1,6 +1,8 @@
 // Frames to somebody who watches as they come: a camera device, a window, a pipe. Show or drop: a
-// frame that comes too late, or that nobody takes in time, is dropped and counted, never queued, so
-// that what is seen is never older than a frame. For files, which need every frame: file_sink.h.
+// frame whose time has passed before it is drawn, or that nobody takes in time, is dropped and
+// counted, never queued. What was drawn is shown however long that took: it is the newest picture
+// that there is, and a machine too slow for the rate shows fewer pictures, not none. For files,
+// which need every frame: file_sink.h.
 //
 //   for (uint64_t due_ns = now_ns();; due_ns += interval_ns) {
 //     sleep_until(due_ns);
@@ -25,6 +27,7 @@ class LiveSink {
   };
   struct Counts {
     uint64_t shown = 0;
+    uint64_t late = 0;  // of those shown: when the one after was due already
     uint64_t dropped = 0;
   };
 
@@ -41,7 +44,7 @@ class LiveSink {
   // dropped then. For callers that ask before they render.
   bool drop_late(uint64_t due_ns);
   // Shows the frame of format() that was due at due_ns, or drops it; says which. Waits for a slow
-  // receiver until the next frame is due, no longer; not for the frame's own time: pace is the
+  // receiver until a frame is due again, no longer; not for the frame's own time: pace is the
   // caller's. Error: the receiver is gone.
   Result<bool> show(const RenderedFrame& frame, uint64_t due_ns);
   // Whether who watches wants no more of it, which is no error: a window that was closed. Once for
@@ -60,8 +63,6 @@ class LiveSink {
   // Gives the receiver the frame before deadline_ns, or not at all (false). Keeps nothing of it but
   // what the receiver has begun to take.
   virtual Result<bool> put(const RenderedFrame& frame, uint64_t deadline_ns) = 0;
-  uint64_t next_due_ns(uint64_t due_ns) const { return due_ns + interval_ns_; }
-
   Options options_;
   uint64_t interval_ns_;
   Counts counts_;

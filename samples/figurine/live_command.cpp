@@ -139,6 +139,7 @@ nlohmann::ordered_json describe(const LiveOptions& options, const LiveRun& run,
   json["ended_by"] = to_string(run.end);
   json["frames"] = run.ticks;
   json["shown_frames"] = loop.sink.counts().shown;
+  json["late_frames"] = loop.sink.counts().late;
   json["dropped_frames"] = loop.sink.counts().dropped;
   json["latency_ms"] = quantiles(run.latency);
   json["rendering_ms"] = quantiles(run.rendering);
@@ -154,11 +155,13 @@ nlohmann::ordered_json describe(const LiveOptions& options, const LiveRun& run,
 void print_summary(const LiveRun& run, const LiveLoop& loop) {
   char text[256];
   std::snprintf(text, sizeof(text),
-                "live: %llu frames shown, %llu dropped in %.1f s; from pose to pixels p50 %.1f ms, "
+                "live: %llu frames shown (%llu late), %llu dropped in %.1f s; from pose to pixels "
+                "p50 %.1f ms, "
                 "p99 %.1f ms",
                 static_cast<unsigned long long>(loop.sink.counts().shown),
                 static_cast<unsigned long long>(loop.sink.counts().dropped), run.seconds,
                 run.latency.percentile_ms(50), run.latency.percentile_ms(99));
+                static_cast<unsigned long long>(loop.sink.counts().late),
   ports::say(text + (loop.feed == nullptr ? "" : "; " + loop.feed->summary()));
 }
 
