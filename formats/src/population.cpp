@@ -209,8 +209,10 @@ Avatar open_member(const Population& population, size_t member, std::span<float>
   if (features > 0) {
     const std::span<float> covariance = storage.subspan(weights, features * features);
     pose_covariance(population, member, covariance);
-    avatar.pose_statistics = {population.pose_joints,
-                              row_of(population.pose_mean, population, member), covariance};
+    avatar.pose_statistics = {.joints = population.pose_joints,
+                              .mean = row_of(population.pose_mean, population, member),
+                              .covariance = covariance,
+                              .distances = {}};
   }
   return avatar;
 }

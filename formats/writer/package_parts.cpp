@@ -133,11 +133,14 @@ Status add_shared_network(const Sampler& sampler, PackageParts& parts, PartList&
   return {};
 }
 
-void add_pose_statistics(const PoseStatistics& statistics, PartList& list) {
+void add_pose_statistics(const PoseStatistics& statistics, PackageParts& parts, PartList& list) {
   const size_t features = statistics.joints.size() * 3;
   if (features == 0) return;
   list.add("pose.mean", statistics.mean, {}, features);
   list.add("pose.covariance", statistics.covariance, {static_cast<uint32_t>(features)}, features);
+  if (statistics.distances.empty()) return;
+  parts.optional_features |= kOptionalPoseDistances;
+  list.add_optional("pose.distances", statistics.distances, {}, statistics.distances.size());
 }
 
 }  // namespace
@@ -177,7 +180,7 @@ Result<PackageParts> take_apart(const Avatar& avatar, const Budget& budget,
   if (layout::needs_static_feature(avatar)) parts.required_features |= kFeatureStaticPart;
   if (layout::needs_filter_feature(avatar)) parts.required_features |= kFeatureFilters;
   if (avatar.decoding.max_offset != 0) parts.required_features |= kFeatureBoundedOffsets;
-  add_pose_statistics(avatar.pose_statistics, list);
+  add_pose_statistics(avatar.pose_statistics, parts, list);
   list.add("golden.rotations", avatar.golden.rotations, {4});
   list.add("golden.png", avatar.golden.png);
   if (!list.status().ok()) return list.status();
@@ -296,7 +299,7 @@ Result<PackageParts> take_apart(const Sampler& sampler, const Budget& budget,
   list.add("denoiser.bias", sampler.bias, {}, rows);
   list.add("denoiser.position", sampler.position, {d}, tokens.size() + 1);
   list.add("denoiser.norm", sampler.norm, {2, d}, size_t{2} * sampler.denoiser.blocks + 1);
-  add_pose_statistics(sampler.pose_statistics, list);
+  add_pose_statistics(sampler.pose_statistics, parts, list);
   list.add("golden.rotations", sampler.golden.rotations, {4});
   FIG_RETURN_IF_ERROR(add_shared_network(sampler, parts, list));
   for (size_t g = 0; g < sampler.static_groups.size(); ++g) {

@@ -119,7 +119,8 @@ typedef struct fig_package_options {
   int copy;         /* 0: the bytes are borrowed, must start at a multiple of 64 and stay unchanged
                        until fig_package_close; 1: the library keeps a copy of its own */
   int for_drawing;  /* 1: only what drawing takes is verified and read, of an avatar that has its
-                       network in floats and in fixed point the latter; 0: everything */
+                       network in floats and in fixed point the latter, and what poses it knows;
+                       0: everything */
 } fig_package_options;
 FIG_DEFAULT(package_options)
 
@@ -323,6 +324,10 @@ typedef struct fig_frame_avatar {
   fig_avatar avatar;
   const fig_pose* pose;
   fig_avatar coarse; /* the same person in less detail, for when it is small; {0}: none */
+  /* 1: where the pose is farther out than 95 % of those that the avatar was trained on, its network
+   * is shown a nearer one, while skinning keeps the true one; 0. Nothing changes where the package
+   * does not say what it knows. */
+  uint32_t keep_to_known;
 } fig_frame_avatar;
 FIG_DEFAULT(frame_avatar)
 
@@ -391,6 +396,18 @@ FIG_API fig_status fig_renderer_render(fig_renderer renderer, const fig_frame* f
 FIG_API fig_status fig_renderer_pose_avatar(fig_renderer renderer, fig_avatar avatar,
                                             const fig_pose* pose, fig_gaussians* gaussians);
 
+/* How unusual a pose is to an avatar. */
+typedef struct fig_pose_rarity {
+  size_t struct_bytes;
+  int known;          /* 0: the package does not say what poses it knows, and the rest is 0 */
+  float distance;     /* from the mean of the training poses, in their own deviations */
+  float share_beyond; /* of the training poses, those that are farther out; 0 to 1 */
+} fig_pose_rarity;
+FIG_DEFAULT(pose_rarity)
+/* About 10 us; allocates nothing. */
+FIG_API fig_status fig_renderer_pose_rarity(fig_renderer renderer, fig_avatar avatar,
+                                            const fig_pose* pose, fig_pose_rarity* rarity);
+
 /* What the last frame came to. Times are of all threads together and need now_ns. */
 typedef struct fig_statistics {
   size_t struct_bytes;
@@ -403,6 +420,7 @@ typedef struct fig_statistics {
   uint64_t macs;      /* of networks */
   /* Left out: texels; Gaussians; Gaussians; pairs of boxes; pairs behind opaque tiles. */
   uint64_t hidden_texels, transparent, outside, missed_tiles, stopped;
+  uint64_t pulled_poses; /* of avatars whose network was shown another (keep_to_known) */
 } fig_statistics;
 FIG_DEFAULT(statistics)
 FIG_API fig_status fig_renderer_statistics(fig_renderer renderer, fig_statistics* statistics);

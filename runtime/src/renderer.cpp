@@ -198,6 +198,7 @@ Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view, c
   const uint32_t sh_degree = std::min(posed.sh_degree(), frame.approximation.sh_degree);
   const Result<NetworkUse> use = posed.pose({.pose = seen.pose,
                                              .avatar = shown,
+                                             .keep_to_known = seen.keep_to_known,
                                              .view = &view,
                                              .leave_out = frame.leave_out,
                                              .approximation = frame.approximation},
@@ -213,6 +214,7 @@ Status Renderer::Impl::add(const FrameAvatar& seen, const kernels::View& view, c
                  });
   of_frame.left_out.hidden_texels += scratch.hidden_texels;
   of_frame.averted_texels += scratch.averted_texels;
+  of_frame.pulled_poses += scratch.is_pulled ? 1 : 0;
   of_frame.coarse_avatars += shown != seen.avatar ? 1 : 0;
   of_frame.macs += *use == NetworkUse::kRun ? posed.macs() : 0;
   of_frame.networks += *use == NetworkUse::kRun ? 1 : 0;
@@ -350,6 +352,14 @@ Result<GaussianView> Renderer::pose_avatar(AvatarId id, const PoseView& pose) {
     impl_->gaussians.store(block, i, lanes, posed.sh_degree());
   }
   return impl_->gaussians.view(count, posed.sh_degree());
+}
+
+Result<std::optional<PoseRarity>> Renderer::pose_rarity(AvatarId id, const PoseView& pose) const {
+  const FloatModeScope mode(FloatMode::frame());
+  const MemoryReserve messages;
+  if (!messages.held()) return no_memory();
+  FIG_RETURN_IF_ERROR(impl_->validate_avatar(id, pose));
+  return impl_->avatar(id).rarity(pose);
 }
 
 Isa Renderer::isa() const { return impl_->kernels.isa; }

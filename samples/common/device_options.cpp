@@ -166,6 +166,9 @@ void add_place_options(CLI::App& app, SceneOptions& options, bool places) {
                  "so many of every avatar, in rows and columns, each at a moment of its own")
       ->check(ports::between(1, 1024))
       ->capture_default_str();
+  app.add_flag("--keep-to-known", options.keep_to_known,
+               "show networks a nearer pose where one is farther out than 95 % of those that they "
+               "were trained on; skinning keeps the true one (docs/poses.md)");
 }
 
 void OmissionOptions::add_to(CLI::App& app) {

@@ -55,7 +55,8 @@ struct SceneOptions;
 void add_avatars_argument(CLI::App& app, std::vector<std::string>& avatars);
 void add_body_option(CLI::App& app, std::string& body);
 void add_motion_option(CLI::App& app, std::vector<std::string>& motions, const std::string& what);
-// Where they stand: --place (unless places is false), --spacing, --coarse and --crowd.
+// Where they stand: --place (unless places is false), --spacing, --coarse and --crowd; and
+// --keep-to-known.
 void add_place_options(CLI::App& app, SceneOptions& options, bool places = true);
 
 // How they are seen: --camera, --framing and --size; unless the camera stays, --follow and --near.

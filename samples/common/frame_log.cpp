@@ -38,6 +38,7 @@ void FrameLog::add(const FrameStatistics& statistics, uint64_t total_ns) {
   stale_networks_ += statistics.stale_networks;
   coarse_avatars_ += statistics.coarse_avatars;
   averted_texels_ += statistics.averted_texels;
+  pulled_poses_ += statistics.pulled_poses;
 }
 
 uint64_t FrameLog::missed_60hz() const {
@@ -82,7 +83,8 @@ nlohmann::ordered_json FrameLog::work_json() const {
           {"unchanged_networks", per_frame(unchanged_networks_)},
           {"stale_networks", per_frame(stale_networks_)},
           {"coarse_avatars", per_frame(coarse_avatars_)},
-          {"averted_texels", per_frame(averted_texels_)}};
+          {"averted_texels", per_frame(averted_texels_)},
+          {"pulled_poses", per_frame(pulled_poses_)}};
 }
 
 }  // namespace figurine::samples

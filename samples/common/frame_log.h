@@ -39,7 +39,7 @@ class FrameLog {
   std::vector<double> stage_ms_[kStageCount];
   std::vector<double> gaussians_, visible_, pairs_, blends_, macs_;
   uint64_t networks_ = 0, unchanged_networks_ = 0, stale_networks_ = 0, coarse_avatars_ = 0,
-           averted_texels_ = 0;
+           averted_texels_ = 0, pulled_poses_ = 0;
 };
 
 }  // namespace figurine::samples

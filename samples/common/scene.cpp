@@ -22,6 +22,12 @@ std::vector<float> rest_joints(const Avatar& avatar, const Body& body) {
   return joints;
 }
 
+OpenOptions open_options(const SceneOptions& options) {
+  OpenOptions open = options.open;
+  open.pose_statistics = open.pose_statistics || options.keep_to_known;
+  return open;
+}
+
 // The motion of a figure, checked against its body; none where none is asked for.
 Result<std::unique_ptr<LoadedPackage>> load_motion(const std::vector<std::string>& motions,
                                                    size_t index, const LoadedPackage& body) {
@@ -98,7 +104,8 @@ PoseView Scene::Figure::recorded_pose(uint32_t frame) const {
 
 Status Scene::load_packages(const SceneOptions& options, size_t index,
                             std::span<const Figure> others, Figure& figure) {
-  Result<std::unique_ptr<LoadedAvatar>> avatar = load_avatar(options.avatars[index], options.open);
+  Result<std::unique_ptr<LoadedAvatar>> avatar =
+      load_avatar(options.avatars[index], open_options(options));
   if (!avatar.ok()) return avatar.status();
   figure.avatar = std::move(*avatar);
   Result<std::shared_ptr<LoadedPackage>> body = body_of(*figure.avatar, options.body, others);
@@ -120,7 +127,7 @@ Status Scene::load_coarse(const SceneOptions& options, size_t index, std::span<c
                           Figure& figure) {
   if (options.coarse.empty()) return {};
   Result<std::unique_ptr<LoadedAvatar>> coarse =
-      load_avatar(options.coarse[options.coarse.size() == 1 ? 0 : index], options.open);
+      load_avatar(options.coarse[options.coarse.size() == 1 ? 0 : index], open_options(options));
   if (!coarse.ok()) return coarse.status();
   figure.coarse = std::move(*coarse);
   Result<std::shared_ptr<LoadedPackage>> body = body_of(*figure.coarse, "", std::span(&figure, 1));
@@ -239,7 +246,12 @@ Result<Scene> Scene::load(const SceneOptions& options) {
   }
   scene.find_length();
   scene.posed_.resize(count);
+  scene.keep_to_known(options.keep_to_known);
   return scene;
+}
+
+void Scene::keep_to_known(bool keep) {
+  for (FrameAvatar& posed : posed_) posed.keep_to_known = keep;
 }
 
 Result<std::vector<uint32_t>> Scene::frames(const FrameRange& range) const {

@@ -28,8 +28,9 @@ struct SceneOptions {
   // Above 1: so many of every avatar in rows and columns, looking everywhere, each at a moment of
   // its own of what they do.
   uint32_t crowd = 1;
-  // What the avatars' packages are opened for.
+  // What the avatars' packages are opened for; with keep_to_known also for what poses they know.
   OpenOptions open;
+  bool keep_to_known = false;  // FrameAvatar's, of every figure
 };
 
 class Scene {
@@ -64,6 +65,8 @@ class Scene {
   void swap_figures(size_t a, size_t b);
   // As in a newcomer, of a figure that stays; null: the golden pose again.
   Status set_motion(size_t figure, const std::shared_ptr<LoadedPackage>& motion);
+  // FrameAvatar::keep_to_known of every figure that is there now.
+  void keep_to_known(bool keep);
   void set_place(size_t figure, const Placement& place) { figures_[figure].place = place; }
 
   size_t size() const { return figures_.size(); }

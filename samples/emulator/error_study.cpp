@@ -64,7 +64,10 @@ Result<ErrorStudy::Frames> ErrorStudy::draw(const StudyView& view, const Setting
   const auto render = [&](size_t moment) -> Result<double> {
     if (cancelled) return Status(StatusCode::kInterrupted, "cancelled");
     std::vector<FrameAvatar> posed = ids_;
-    for (size_t f = 0; f < ids_.size(); ++f) posed[f].pose = view.moments[moment][f].view();
+    for (size_t f = 0; f < ids_.size(); ++f) {
+      posed[f].pose = view.moments[moment][f].view();
+      posed[f].keep_to_known = settings.keep_to_known;
+    }
     const uint64_t start_ns = ports::thread_cpu_ns();
     FIG_RETURN_IF_ERROR(renderer_->render(
         {.camera = view.camera,

@@ -572,6 +572,7 @@ Status Session::draw() {
     if (!seen.ok()) return report(seen.status());
     std::vector<GaussianView> gaussians;
     if (cloud_) gaussians.push_back(cloud_->view());
+    scene_.keep_to_known(settings_.keep_to_known);
     const uint64_t start_ns = ports::now_ns();
     FIG_RETURN_IF_ERROR(report(renderer_->render(
         {.camera = *seen,

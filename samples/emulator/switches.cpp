@@ -134,6 +134,19 @@ constexpr Switch kSwitches[] = {
          [](Settings& s, double value) {
            s.approximation.sh_degree = static_cast<uint32_t>(std::lround(value));
          }},
+    {.name = "keep-to-known",
+     .label = "Keep to known poses",
+     .meaning = "Far outside of what an avatar was trained on, its network is shown a nearer pose; "
+                "no time is won",
+     .exact = false,
+     .off = 0,
+     .tried = 1,
+     .scale = false,
+     .least = 0,
+     .most = 1,
+     .format = "",
+     .get = [](const Settings& s) { return s.keep_to_known ? 1.0 : 0.0; },
+     .set = [](Settings& s, double value) { s.keep_to_known = value != 0; }},
 };
 
 }  // namespace

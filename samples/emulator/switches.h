@@ -1,5 +1,6 @@
 // What a frame may leave out, as switches with names: those that change no bit of the picture
-// (LeaveOut), and those that show (Approximation). A table; a new field of either is a row here.
+// (LeaveOut), and those that show (Approximation), or are there to show (keep_to_known). A table; a
+// new field of any is a row here.
 #pragma once
 
 #include <optional>
@@ -16,6 +17,7 @@ namespace figurine::emulator {
 struct Settings {
   LeaveOut leave_out;
   Approximation approximation;
+  bool keep_to_known = false;  // FrameAvatar's, of every figure
   friend bool operator==(const Settings& a, const Settings& b);
 };
 

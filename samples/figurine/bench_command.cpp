@@ -194,6 +194,7 @@ nlohmann::ordered_json describe(const BenchSubject& subject, const std::vector<B
   json["frames"] = subject.frames;
   json["figures"] = lanes[0].figures() ? lanes[0].figures()->size() : 0;
   add_json(lanes[0].approximation(), json);
+  json["keep_to_known"] = subject.scene.keep_to_known;
   json["size"] = {lanes[0].size().width_px, lanes[0].size().height_px};
   return json;
 }

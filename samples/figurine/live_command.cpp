@@ -145,6 +145,8 @@ nlohmann::ordered_json describe(const LiveOptions& options, const LiveRun& run,
   json["rendering_ms"] = quantiles(run.rendering);
   json["poses"] = loop.feed == nullptr ? nlohmann::ordered_json() : loop.feed->counts();
   add_json(loop.approximation, json);
+  json["keep_to_known"] = options.scene.keep_to_known;
+  json["pulled_poses"] = run.pulled_poses;
   json["renderer_memory_bytes"] = loop.renderer.memory_bytes();
   json["peak_memory_bytes"] = peak_memory_bytes();
   json["machine"] =
@@ -159,9 +161,9 @@ void print_summary(const LiveRun& run, const LiveLoop& loop) {
                 "p50 %.1f ms, "
                 "p99 %.1f ms",
                 static_cast<unsigned long long>(loop.sink.counts().shown),
+                static_cast<unsigned long long>(loop.sink.counts().late),
                 static_cast<unsigned long long>(loop.sink.counts().dropped), run.seconds,
                 run.latency.percentile_ms(50), run.latency.percentile_ms(99));
-                static_cast<unsigned long long>(loop.sink.counts().late),
   ports::say(text + (loop.feed == nullptr ? "" : "; " + loop.feed->summary()));
 }
 

@@ -80,6 +80,7 @@ Status run_ticks(LiveLoop& loop, LiveRun& run) {
     if (!shown.ok()) return shown.status();
     if (!*shown) continue;
     run.rendering.add(drawn_ns - begin_ns);
+    run.pulled_poses += loop.renderer.statistics().pulled_poses;
     const std::optional<uint64_t> pose_ns =
         loop.feed == nullptr ? std::optional(due_ns) : loop.feed->arrived_ns();
     if (pose_ns && pose_ns != last_pose_ns) run.latency.add(ports::now_ns() - *pose_ns);

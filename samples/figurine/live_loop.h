@@ -46,6 +46,7 @@ struct LiveRun {
   LatencyHistogram latency;    // from a pose's arrival until its pixels were handed over; each pose
                                // once, of those that were shown
   LatencyHistogram rendering;  // of the frames that were shown
+  uint64_t pulled_poses = 0;   // in those frames, of figures that kept to what they know
 };
 
 // Draws and shows; the first frame is drawn once before the clock runs, so that what a renderer

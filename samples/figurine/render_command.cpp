@@ -213,6 +213,7 @@ Status run_render(const RenderOptions& options) {
         1000 / std::max(log.total_ms().median, 1e-6);  // of rendering, by the median frame
     json["frames_per_second_with_output"] = frame_count / std::max(wall_s, 1e-9);
     add_json(approximation, json);
+    json["keep_to_known"] = options.scene.keep_to_known;
     json["stages_ms"] = log.stages_json();
     json["work"] = log.work_json();
     json["renderer_memory_bytes"] = (*renderer)->memory_bytes();

@@ -18,6 +18,7 @@
 #include "samples/common/image_error.h"
 #include "samples/common/loading.h"
 #include "samples/common/machine.h"
+#include "samples/common/pose_rarity.h"
 #include "samples/common/progress.h"
 #include "samples/common/rendered_frame.h"
 #include "samples/common/scene.h"
@@ -290,6 +291,20 @@ nlohmann::ordered_json dial_json(const Dial& dial, const std::vector<Measurement
   return json;
 }
 
+// How unusual the poses of the frames are; null where the package does not say.
+nlohmann::ordered_json rarities_json(std::span<const uint32_t> frames, Scene& scene,
+                                     const Renderer& renderer) {
+  nlohmann::ordered_json poses = nlohmann::ordered_json::array();
+  for (const uint32_t frame : frames) {
+    const FrameAvatar seen = scene.pose(frame)[0];
+    const Result<std::optional<PoseRarity>> rarity = renderer.pose_rarity(seen.avatar, seen.pose);
+    if (!rarity.ok() || !*rarity) return nullptr;
+    poses.push_back({{"frame", frame}});
+    poses.back().update(rarity_json(**rarity));
+  }
+  return poses;
+}
+
 // Measures a dial whose settings need consecutive frames, over rounds of its sequence.
 Status run_sequences(const ReportOptions& options, const RendererOptions& renderer_options,
                      const CameraPathOptions& camera_path, const Dial& dial, uint32_t rounds,
@@ -363,6 +378,7 @@ Status run_report(const ReportOptions& options) {
       make_camera_path(camera_path, frames, scene, *first->renderer);
   if (!cameras.ok()) return cameras.status();
   const std::string precision = scene.precision(*first->renderer);
+  const nlohmann::ordered_json rarities = rarities_json(frames, scene, *first->renderer);
   SettingRenderer drawing(std::move(*first), std::move(*floats), std::move(frames),
                           std::move(*cameras));
 
@@ -401,6 +417,7 @@ Status run_report(const ReportOptions& options) {
   json["motion"] = options.scene.motions.empty() ? nlohmann::ordered_json()
                                                  : nlohmann::ordered_json(options.scene.motions[0]);
   json["frames"] = options.frames;
+  json["poses"] = rarities;
   json["size"] = {drawing.size().width_px, drawing.size().height_px};
   json["reference"] = {{"alpha_cut", kReferenceCut}, {"meaning", kReferenceMeaning}};
   json["metric"] =

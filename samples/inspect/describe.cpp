@@ -216,6 +216,15 @@ Json describe_smallest_extents(const SmallestExtents& extents) {
           {"max_m", number(extents.scale_m * static_cast<float>(high))}};
 }
 
+// How far the training poses are from their mean.
+Json describe_distances(std::span<const float> distances) {
+  if (distances.empty()) return nullptr;
+  return {{"count", distances.size()},
+          {"min", number(distances.front())},
+          {"median", number(distances[distances.size() / 2])},
+          {"max", number(distances.back())}};
+}
+
 const char* template_name(TemplateMode mode) {
   return mode == TemplateMode::kMean ? "mean" : "shaped";
 }
@@ -254,6 +263,7 @@ Json describe_avatar(const Avatar& avatar) {
                         {"smallest_extents", describe_smallest_extents(avatar.smallest_extents)},
                         {"antialiased", avatar.antialiased},
                         {"pose_statistics_joints", avatar.pose_statistics.joints},
+                        {"pose_distances", describe_distances(avatar.pose_statistics.distances)},
                         {"golden", describe_golden(avatar.golden)}});
 }
 

@@ -121,8 +121,15 @@ void print_decoding(Page& page, const Json& decoding) {
                         text_of(decoding["sh_degree"])));
 }
 
-void print_pose_statistics(Page& page, const Json& joints) {
-  page.line("pose statistics", joints.empty() ? "none" : std::to_string(joints.size()) + " joints");
+void print_pose_statistics(Page& page, const Json& joints, const Json& distances = nullptr) {
+  if (joints.empty()) return page.line("pose statistics", "none");
+  std::string text = std::to_string(joints.size()) + " joints";
+  if (!distances.is_null()) {
+    text += std::format("; training poses at {:.2f} to {:.2f}, half of them within {:.2f}",
+                        distances["min"].get<double>(), distances["max"].get<double>(),
+                        distances["median"].get<double>());
+  }
+  page.line("pose statistics", text);
 }
 
 void print_static_part(Page& page, const Json& part) {
@@ -185,7 +192,7 @@ void print_avatar(Page& page, const Json& avatar) {
   }
   page.line("Fourier octaves", text_of(avatar["fourier_octaves"]));
   print_decoding(page, avatar["decoding"]);
-  print_pose_statistics(page, avatar["pose_statistics_joints"]);
+  print_pose_statistics(page, avatar["pose_statistics_joints"], avatar["pose_distances"]);
   const Json& golden = avatar["golden"];
   if (golden.is_null()) {
     page.line("golden frame", "none");

@@ -1,5 +1,5 @@
-# Sourced by line.sh, quantization.sh and sharp.sh, in the checkout and with $folder set: tools.sh,
-# the shipped person's body, the motions, a person's capture.
+# Sourced by line.sh, quantization.sh, sharp.sh and unusual_poses.sh, in the checkout and with
+# $folder set: tools.sh, the shipped person's body, the motions, a person's capture.
 #
 # People walk (four walks and an endless one from CMU 01_03) and jump (01_01), turned through 360
 # degrees. What is in $folder already stays.

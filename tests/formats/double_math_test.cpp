@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "tests/emulated.h"
 #include "tests/largest_error.h"
@@ -98,6 +99,25 @@ TEST(DoubleMath, SineAndCosineErrorsAreWithinTheirStatement) {
     EXPECT_EQ(sine_cosine_of_turns(x).cosine, std::round(std::cos(static_cast<double>(turn) * x)))
         << x;
   }
+}
+
+TEST(DoubleMath, AngleErrorIsWithinItsStatement) {
+  LargestError error("angle of a sine and a cosine, relative");
+  for_each_place(0, 1, [&](double turns) {
+    const double angle = std::numbers::pi / 2 * turns, size = 0.5 + turns;
+    const double sine = size * std::sin(angle), cosine = std::fmax(0.0, size * std::cos(angle));
+    if (sine > 0)
+      error.add(
+          relative(angle_of(sine, cosine), std::atan2(static_cast<long double>(sine), cosine)));
+  });
+  for_each_size(1, [&](double sine) {
+    sine = std::fabs(sine);
+    const double cosine = std::sqrt(1 - std::fmin(1.0, sine * sine));
+    error.add(relative(angle_of(sine, cosine), std::atan2(static_cast<long double>(sine), cosine)));
+  });
+  EXPECT_LE(error.largest(), 8e-16);
+  EXPECT_EQ(angle_of(0, 1), 0);
+  EXPECT_NEAR(angle_of(1, 0), std::numbers::pi / 2, 3e-16);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "figurine/known_poses.h"
 #include "figurine/texel_grid.h"
 #include "formats/src/package/checksum.h"
 #include "formats/src/package/text.h"
@@ -193,6 +194,20 @@ bool exercise_golden(const GoldenFrame& golden) {
          validate_pose({golden.root_translation_m, golden.rotations}, joints).ok();
 }
 
+// What a device asks of them, of a pose far from any.
+bool exercise_known_poses(const PoseStatistics& statistics) {
+  if (statistics.distances.empty()) return true;
+  const Result<KnownPoses> known = KnownPoses::create(statistics);
+  if (!known.ok()) return false;
+  std::vector<float> rotations, pulled(4 * size_t{kMaxJoints});
+  for (uint32_t joint = 0; joint < kMaxJoints; ++joint)
+    rotations.insert(rotations.end(), {0.5f, 0.75f, -0.25f, 0.5f});
+  const PoseRarity rarity = known->rarity(rotations);
+  known->pull(rotations, pulled);
+  return std::isfinite(rarity.distance) && rarity.share_beyond >= 0 && rarity.share_beyond <= 1 &&
+         all_finite(pulled);
+}
+
 bool exercise_avatar(const Avatar& avatar, std::string& reason) {
   if (avatar.has_network() && !exercise_network(avatar, reason)) return false;
   reason = "a static part";
@@ -207,6 +222,8 @@ bool exercise_avatar(const Avatar& avatar, std::string& reason) {
   if (!all_finite(avatar.shape) || !all_finite(avatar.pose_statistics.mean) ||
       !all_finite(avatar.pose_statistics.covariance))
     return false;
+  reason = "known poses";
+  if (!exercise_known_poses(avatar.pose_statistics)) return false;
   reason = "golden frame";
   return exercise_golden(avatar.golden);
 }

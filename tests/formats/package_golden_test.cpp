@@ -54,7 +54,8 @@ TEST(PackageGolden, TodaysReaderReadsTheGoldenBytes) {
       {SampleKind::kSampler, "37c01096e6a65cd32cc813da0c34f7b8"},
       {SampleKind::kStaticAvatar, "d4f80846a7bbca94f4599dc86a079988"},
       {SampleKind::kStaticOnlyAvatar, "588a70e90250cc1c0e3a0ccdaa3903f2"},
-      {SampleKind::kFilteredAvatar, "28ef19cd6a61e627ced1dfdcc1291923"}};
+      {SampleKind::kFilteredAvatar, "28ef19cd6a61e627ced1dfdcc1291923"},
+      {SampleKind::kKnownPosesAvatar, "44c9e9fa99870d43fd2023fe1770e5a8"}};
   for (const auto& [kind, hash] : expected) {
     const samples::ExactBytes bytes(read_golden(kind));
     const Result<Package> package = Package::open(bytes.bytes(), golden_path(kind));

@@ -116,7 +116,8 @@ AvatarSample::AvatarSample() {
   fill_network(*this);
   pose_mean = {0.25f, 0, -0.5f};
   pose_covariance = {0.5f, 0.125f, 0, 0.125f, 0.25f, 0.0625f, 0, 0.0625f, 1};
-  avatar.pose_statistics = {.joints = {2}, .mean = pose_mean, .covariance = pose_covariance};
+  avatar.pose_statistics = {
+      .joints = {2}, .mean = pose_mean, .covariance = pose_covariance, .distances = {}};
   golden_rotations = {1, 0, 0, 0, 0, 1, 0, 0, 0.5f, 0.5f, 0.5f, 0.5f};
   golden_png = png_start(16, 24);
   avatar.golden.root_translation_m = {0.25f, 0, -1};
@@ -218,6 +219,18 @@ FilteredAvatarSample::FilteredAvatarSample() : extents{0, 1, 100, 254, 255} {
   avatar.antialiased = true;
 }
 
+KnownPosesAvatarSample::KnownPosesAvatarSample() : pose_distances{0.5f, 1, 1, 2, 4} {
+  avatar.name = "sample avatar that knows poses";
+  pose_mean = {0, 0, 0, 0.25f, 0, -0.5f};
+  pose_covariance.assign(36, 0);
+  for (size_t i = 0; i < 6; ++i) pose_covariance[7 * i] = i < 3 ? 0.25f : 0.0625f;
+  pose_covariance[3] = pose_covariance[18] = 0.03125f;  // the root's tilt forward goes with joint 2
+  avatar.pose_statistics = {.joints = {0, 2},
+                            .mean = pose_mean,
+                            .covariance = pose_covariance,
+                            .distances = pose_distances};
+}
+
 PopulationSample::PopulationSample(DifferenceCoding coding)
     : initial(std::make_unique<AvatarSample>()) {
   for (size_t m = 0; m < 3; ++m) {
@@ -299,6 +312,7 @@ std::string to_string(SampleKind kind) {
   if (kind == SampleKind::kFilteredAvatar) return "filtered_avatar";
   if (kind == SampleKind::kStaticPopulation) return "static_population";
   if (kind == SampleKind::kStaticSampler) return "static_sampler";
+  if (kind == SampleKind::kKnownPosesAvatar) return "known_poses_avatar";
   return figurine::to_string(package_kind(kind));
 }
 
@@ -311,6 +325,7 @@ PackageKind package_kind(SampleKind kind) {
     case SampleKind::kStaticAvatar:
     case SampleKind::kStaticOnlyAvatar:
     case SampleKind::kFilteredAvatar:
+    case SampleKind::kKnownPosesAvatar:
       return PackageKind::kAvatar;
     case SampleKind::kMotion:
       return PackageKind::kMotion;
@@ -351,6 +366,8 @@ Result<std::vector<std::byte>> write_sample(SampleKind kind) {
       return StaticOnlyAvatarSample().write();
     case SampleKind::kFilteredAvatar:
       return FilteredAvatarSample().write();
+    case SampleKind::kKnownPosesAvatar:
+      return KnownPosesAvatarSample().write();
   }
   return Status(StatusCode::kInvalidArgument, "no such sample");
 }
@@ -392,8 +409,10 @@ SamplerSample::SamplerSample() {
   sampler.bias = bias;
   sampler.position = position;
   sampler.norm = norm;
-  sampler.pose_statistics = {
-      .joints = from.pose_statistics.joints, .mean = pose_mean, .covariance = pose_covariance};
+  sampler.pose_statistics = {.joints = from.pose_statistics.joints,
+                             .mean = pose_mean,
+                             .covariance = pose_covariance,
+                             .distances = {}};
   sampler.golden = from.golden;  // its picture and its hash are an avatar's
   sampler.golden.rotations = golden_rotations;
   sampler.golden.png = {};

@@ -82,6 +82,12 @@ struct FilteredAvatarSample : StaticAvatarSample {
   std::vector<uint8_t> extents;  // [5]
 };
 
+// The avatar with a table of its training poses' distances, of the root and of another joint.
+struct KnownPosesAvatarSample : AvatarSample {
+  KnownPosesAvatarSample();
+  std::vector<float> pose_distances;  // [5]
+};
+
 // Three avatars of one network, each a little different from common initial weights: one
 // population, in integers or in halves.
 struct PopulationSample {
@@ -161,13 +167,22 @@ enum class SampleKind {
   kStaticOnlyAvatar,
   kFilteredAvatar,
   kStaticPopulation,
-  kStaticSampler
+  kStaticSampler,
+  kKnownPosesAvatar
 };
-inline constexpr SampleKind kSampleKinds[] = {
-    SampleKind::kBody,           SampleKind::kAvatar,           SampleKind::kFixedPointAvatar,
-    SampleKind::kMotion,         SampleKind::kPopulation,       SampleKind::kHalfPopulation,
-    SampleKind::kSampler,        SampleKind::kStaticAvatar,     SampleKind::kStaticOnlyAvatar,
-    SampleKind::kFilteredAvatar, SampleKind::kStaticPopulation, SampleKind::kStaticSampler};
+inline constexpr SampleKind kSampleKinds[] = {SampleKind::kBody,
+                                              SampleKind::kAvatar,
+                                              SampleKind::kFixedPointAvatar,
+                                              SampleKind::kMotion,
+                                              SampleKind::kPopulation,
+                                              SampleKind::kHalfPopulation,
+                                              SampleKind::kSampler,
+                                              SampleKind::kStaticAvatar,
+                                              SampleKind::kStaticOnlyAvatar,
+                                              SampleKind::kFilteredAvatar,
+                                              SampleKind::kStaticPopulation,
+                                              SampleKind::kStaticSampler,
+                                              SampleKind::kKnownPosesAvatar};
 std::string to_string(SampleKind kind);  // also the name of its golden file: "fixed_point_avatar"
 PackageKind package_kind(SampleKind kind);
 Result<std::vector<std::byte>> write_sample(SampleKind kind);

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "ports/host/files.h"
 #include "ports/media/png.h"
 #include "tests/toolchain/train/small_capture.h"
 #include "toolchain/body/atlas.h"
@@ -13,6 +14,7 @@
 #include "toolchain/reconstruction/requantization.h"
 #include "toolchain/train/avatar_file.h"
 #include "toolchain/train/avatar_model.h"
+#include "toolchain/train/known_poses.h"
 #include "toolchain/train/pack_avatar.h"
 #include "toolchain/train/pack_population.h"
 #include "toolchain/train/trainer.h"
@@ -105,6 +107,29 @@ TEST(Parity, OfAWeightedLayoutIsAtLeast60dB) {
   EXPECT_GT(psnr, flat + 2);
 }
 
+// Into a package from before, and the bytes are those of one that was packed with it.
+TEST(Pack, KnownPosesCanBeAddedLater) {
+  const PackedRun& packed = packed_run(TemplateMode::kShaped);
+  const train::PackageFile file = train::open_package(packed.path, PackageKind::kAvatar);
+  train::TrainedAvatar avatar = train::TrainedAvatar::open({.run = packed.run});
+  std::vector<std::vector<float>> poses;
+  for (const dataset::CaptureFrame& frame : avatar.data().frames()) {
+    if (frame.split == dataset::FrameSplit::kTrain) poses.push_back(frame.rotations);
+  }
+  EXPECT_LT(poses.size(), avatar.data().frames().size()) << "held-out poses are not known";
+  Avatar silent = file.package.avatar();
+  silent.pose_statistics = {};
+  const AlignedBytes before(value_or_throw(
+      write_package(silent, file.package.budget(), file.package.provenance()), "silent"));
+  const Package opened = value_or_throw(Package::open(before.bytes(), "silent"), "silent");
+  const std::vector<std::byte> after =
+      train::with_known_poses(opened, train::known_poses(poses, avatar.body().joint_count()));
+  const ports::MappedFile packed_with_it =
+      value_or_throw(ports::MappedFile::open(packed.path), packed.path);
+  const std::span<const std::byte> wanted = packed_with_it.bytes();
+  EXPECT_TRUE(std::equal(after.begin(), after.end(), wanted.begin(), wanted.end()));
+}
+
 TEST(Pack, SaysWhatADeviceNeedsToKnow) {
   const PackedRun& packed = packed_run(TemplateMode::kShaped);
   const train::PackageFile file = train::open_package(packed.path, PackageKind::kAvatar);
@@ -116,8 +141,10 @@ TEST(Pack, SaysWhatADeviceNeedsToKnow) {
   EXPECT_EQ(count_parameters(avatar.network), 11326u);
   EXPECT_EQ(file.package.budget().gaussians, body.package.body().texel_count());
   EXPECT_GT(file.package.budget().macs_per_frame, 0u);
-  EXPECT_EQ(avatar.pose_statistics.joints.size(), 21u);
-  EXPECT_EQ(avatar.pose_statistics.covariance.size(), 63u * 63u);
+  EXPECT_EQ(avatar.pose_statistics.joints.size(), 22u);
+  EXPECT_EQ(avatar.pose_statistics.covariance.size(), 66u * 66u);
+  EXPECT_EQ(avatar.pose_statistics.distances.size(), train::kPoseDistances);
+  EXPECT_EQ(file.package.optional_features(), kOptionalPoseDistances);
   EXPECT_EQ(file.package.provenance().depicted_person, "synthetic");
   EXPECT_FALSE(file.package.provenance().sources.empty());
   const Result<ports::ImageU8> golden =

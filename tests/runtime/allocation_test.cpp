@@ -34,9 +34,11 @@ TEST(Allocation, TheCounterSeesNewAndMalloc) {
   EXPECT_EQ(g_allocations - before, 2u);
 }
 
-void expect_no_allocations(uint32_t threads, Held held, const Approximation& approximation = {}) {
+void expect_no_allocations(uint32_t threads, Held held, const Approximation& approximation = {},
+                           bool keep_to_known = false) {
   const SyntheticBody body = make_test_body({.uv_size = 32});
-  const SyntheticAvatar avatar = make_test_avatar(body, {.held = held}),
+  const SyntheticAvatar avatar =
+                            make_test_avatar(body, {.held = held, .known_poses = keep_to_known}),
                         other = make_test_avatar(
                             body, {.sh_degree = 2, .seed = 3, .held = Held::kFixedPoint}),
                         composed = make_test_avatar(
@@ -61,9 +63,10 @@ void expect_no_allocations(uint32_t threads, Held held, const Approximation& app
   std::vector<uint8_t> rgba(200 * 160 * 4);
   uint64_t after_first = 0, first_pairs = 0, largest_pairs = 0;
   for (uint32_t frame = 0; frame < kFrames; ++frame) {
-    const FrameAvatar seen[] = {{.avatar = *a, .pose = poses[frame].view()},
-                                {.avatar = *b, .pose = poses[kFrames - 1 - frame].view()},
-                                {.avatar = *c, .pose = poses[frame].view()}};
+    const FrameAvatar seen[] = {
+        {.avatar = *a, .pose = poses[frame].view(), .keep_to_known = keep_to_known},
+        {.avatar = *b, .pose = poses[kFrames - 1 - frame].view()},
+        {.avatar = *c, .pose = poses[frame].view()}};
     ASSERT_TRUE(renderer
                     ->render({.camera = cameras[frame],
                               .avatars = seen,
@@ -84,6 +87,7 @@ TEST(Allocation, NoFrameAllocatesAfterTheFirst) {
   for (const Held held : {Held::kFloat32, Held::kFixedPoint}) {
     for (const uint32_t threads : {1u, 2u}) expect_no_allocations(threads, held);
     expect_no_allocations(1, held, {.network_interval = 2, .averted_above = 0.2f});
+    expect_no_allocations(1, held, {}, true);
   }
 }
 

@@ -24,6 +24,7 @@ int count_unsound_defaults(void) {
   FIG_LOOK(frame_avatar);
   FIG_LOOK(gaussians);
   FIG_LOOK(frame);
+  FIG_LOOK(pose_rarity);
   FIG_LOOK(statistics);
   FIG_LOOK(sampler_options);
   FIG_LOOK(sample_options);

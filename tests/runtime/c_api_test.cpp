@@ -636,6 +636,9 @@ TEST_F(CApi, StructsOfAnotherSizeAreRefused) {
   });
   fig_statistics statistics = fig_default_statistics();
   both(statistics.struct_bytes, [&] { return fig_renderer_statistics(renderer, &statistics); });
+  fig_pose_rarity rarity = fig_default_pose_rarity();
+  both(rarity.struct_bytes,
+       [&] { return fig_renderer_pose_rarity(renderer, person, &pose, &rarity); });
   fig_package_info info = fig_default_package_info();
   both(info.struct_bytes, [&] { return fig_package_get_info(body, &info); });
   fig_orbit orbit = fig_default_orbit();

@@ -82,7 +82,8 @@ SyntheticBody make_test_body(const SyntheticBodyOptions& options) {
   std::vector<int16_t> parents;
   std::vector<float> joint_position;
   for (uint32_t j = 0; j < joints; ++j) {
-    body.joint_names.push_back("joint" + std::to_string(j));
+    body.joint_names.push_back(options.joint_names.empty() ? "joint" + std::to_string(j)
+                                                           : options.joint_names[j]);
     parents.push_back(static_cast<int16_t>(static_cast<int>(j) - 1));
     const float place[3] = {0, kHeight * static_cast<float>(j) / static_cast<float>(joints), 0};
     joint_position.insert(joint_position.end(), place, place + 3);
@@ -175,6 +176,15 @@ SyntheticAvatar make_test_avatar(const SyntheticBody& body, const SyntheticAvata
       extents.push_back(static_cast<uint8_t>(i * 37 % 256));
     avatar.smallest_extents = {.scale_m = 2e-5f, .codes = extents};
     avatar.antialiased = true;
+  }
+  const size_t features = size_t{3} * body.body().joint_count();
+  const std::vector<float> mean(features, 0), distances{0.25f, 0.5f, 1, 1.5f, 2};
+  std::vector<float> covariance(features * features, 0);
+  for (size_t i = 0; i < features; ++i) covariance[i * features + i] = 0.04f;
+  if (options.known_poses) {
+    avatar.pose_statistics = {{}, mean, covariance, distances};
+    for (uint32_t j = 0; j < body.body().joint_count(); ++j)
+      avatar.pose_statistics.joints.push_back(static_cast<uint8_t>(j));
   }
   uint64_t macs = 0;
   std::vector<std::vector<float>> storage;

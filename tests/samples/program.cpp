@@ -116,6 +116,8 @@ void write_test_packages(const TestFolder& folder) {
   write_file(folder.path("fixed.fgn"),
              make_test_avatar(body, {.held = Held::kFixedPoint}).bytes.bytes());
   write_file(folder.path("filtered.fgn"), make_test_avatar(body, {.filters = true}).bytes.bytes());
+  write_file(folder.path("knowing.fgn"),
+             make_test_avatar(body, {.known_poses = true}).bytes.bytes());
   write_file(folder.path("other_body.fgn"), other.bytes.bytes());
 
   const SyntheticAvatar people[] = {make_test_avatar(body, {.seed = 5, .name = "ada"}),

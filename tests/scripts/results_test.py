@@ -67,6 +67,39 @@ class Results(unittest.TestCase):
         self.assertEqual(rows[0], {"direction": 1, "shape": "0.75", "whole": "0.5"})
         self.assertEqual(rows[3], {"direction": 4, "shape": None, "whole": "0.0625"})
 
+    def test_spectrum_has_kinds_and_quantiles_of_patches(self):
+        patch = {"entries": 30, "directions_for": {"90": 4}, "participation_ratio": 2.5}
+        names = ("static.0.1.2", "static.0.1.3")
+        patches = [patch | {"name": name, "variance_share": [0.5, 0.5]} for name in names]
+        spectrum = {
+            "tokens": [{"name": "shape", "variance_share": [1.0]}, *patches],
+            "by_kind": {"map": {"variance_share": [0.75, 0.25]}},
+            "whole": {"variance_share": [0.625, 0.25]},
+        }
+        rows = population_report.shortened_spectrum(spectrum)
+        self.assertEqual(rows[1], {"direction": 2, "shape": None, "map": "0.25", "whole": "0.25"})
+        self.assertEqual([token["name"] for token in spectrum["tokens"]], ["shape"])
+        self.assertEqual(spectrum["by_kind"]["map"]["variance_of_first"], {"1": 0.75, "2": 1.0})
+        self.assertEqual(spectrum["patches"]["count"], 2)
+        self.assertEqual(spectrum["patches"]["directions_for_90"]["median"], 4)
+
+    def test_population_means_are_there_where_they_were_measured(self):
+        quality = {"psnr_db": 20.0, "flat_psnr_db": 15.0, "head_psnr_db": 18.0}
+        groups = ("views", "poses", "poses_interleaved", "poses_block")
+        row = {"quality": {"held_out_" + group: dict(quality) for group in groups}}
+        row["quality"]["difference_psnr_db"] = 19.0
+        old = population_report.spread([row])
+        self.assertEqual(population_report.mean_of(old, "above_flat_db"), 5.0)
+        self.assertIsNone(population_report.mean_of(old, "bust_head_psnr_db"))
+        poses = {"bust_head_psnr_db": 22.0, "highpass_correlation": 0.5}
+        row["quality"]["held_out_poses"] |= poses
+        row["quality"]["held_out_views"]["highpass_ratio"] = 0.25
+        new = population_report.spread([row])
+        self.assertEqual(population_report.mean_of(new, "bust_head_psnr_db"), 22.0)
+        self.assertEqual(population_report.mean_of(new, "highpass_correlation"), 0.5)
+        self.assertEqual(new["view_highpass_ratio"]["mean"], 0.25)
+        self.assertLessEqual(set(population_report.MEANS), set(new))
+
     def test_entropy_of_runs_that_were_not_judged_again_stays(self):
         with tempfile.TemporaryDirectory() as folder:
             output = pathlib.Path(folder)

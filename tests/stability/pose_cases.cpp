@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "figurine/known_poses.h"
 #include "tests/golden/posing/five_texels_packages.h"
 #include "tests/stability/pose_oracle.h"
 #include "tests/stability/scene.h"
@@ -286,11 +287,69 @@ Rows smallest_extents() {
       {name, "largest relative error of opacity times volume", Bound::kAtMost, 2e-6, largest}};
 }
 
+// What is known about three joints, with variances of next to nothing, of one training pose, and of
+// usual ones; asked about rotations that are none, and about anything else.
+Rows known_poses() {
+  std::vector<float> mean(9, 0.1f), covariance(81, 0);
+  mean[1] = 0;  // of the root's tilt
+  double not_finite_values = 0, beyond = 0, from_mean = 0;
+  size_t pulled_poses = 0;
+  const auto ask = [&](const KnownPoses& known, std::vector<float> rotations, double largest) {
+    const PoseRarity rarity = known.rarity(rotations);
+    not_finite_values += !std::isfinite(rarity.distance) + !std::isfinite(rarity.share_beyond);
+    std::vector<float> pulled = rotations;
+    if (!known.pull(rotations, pulled)) return;
+    ++pulled_poses;
+    not_finite_values += double(count_not_finite(pulled));
+    if (largest > 0) beyond = std::max(beyond, known.distance(pulled) / largest);
+    if (largest > 0) return;
+    std::vector<double> x(9);
+    const uint8_t joints[] = {0, 1, 2};
+    pose_features(joints, pulled, x);
+    for (size_t i = 0; i < 9; ++i) from_mean = std::max(from_mean, std::abs(x[i] - mean[i]));
+  };
+  for (const float variance : {1e-37f, 9e-4f, 1.0f}) {
+    for (size_t i = 0; i < 9; ++i) covariance[10 * i] = variance;
+    for (const std::vector<float>& distances : {std::vector<float>{0, 0}, {1, 2, 2, 3}}) {
+      const KnownPoses known =
+          std::move(KnownPoses::create({{0, 1, 2}, mean, covariance, distances})).value();
+      // A distance of the pulled pose's can be told where floats can tell the deviations apart.
+      const double largest = variance > 1e-30f ? double{distances.back()} : 1e30;
+      for (const float bad : {0.0f, kNan, kInfinity, -kInfinity, 1e-20f, 1e25f}) {
+        for (size_t at = 0; at < 12; ++at) {
+          std::vector<float> rotations{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+          rotations[4 * (at / 4)] = 0;
+          rotations[at] = bad;
+          ask(known, rotations, largest);
+        }
+      }
+      uint64_t state = 1;
+      for (int pose = 0; pose < 2000; ++pose) {
+        std::vector<float> rotations(12);
+        for (float& value : rotations) {
+          state = state * 6364136223846793005u + 1442695040888963407u;
+          value = static_cast<float>(static_cast<double>(state >> 11) * 0x1p-53 - 0.5);
+        }
+        ask(known, rotations, largest);
+      }
+    }
+  }
+  const std::string name = "known poses, asked about 12,000 random ones and 432 that are none";
+  return {{name, "distances, shares and rotations that are not finite", Bound::kAtMost, 0,
+           not_finite_values},
+          {name, "poses that were not pulled", Bound::kAtMost, 432, 12432.0 - double(pulled_poses)},
+          {name, "largest distance of a pulled pose, of the farthest training pose's",
+           Bound::kAtMost, 1.0001, beyond},
+          {"known poses, of one training pose", "largest distance of a pulled pose from it [rad]",
+           Bound::kAtMost, 1e-6, from_mean}};
+}
+
 constexpr Case kCases[] = {{"Twists180", twists},
                            {"RotationsThatAreNone", rotations_that_are_none},
                            {"PosesFarOutside", far_poses},
                            {"ExtremeHeads", extreme_heads},
-                           {"SmallestExtents", smallest_extents}};
+                           {"SmallestExtents", smallest_extents},
+                           {"KnownPoses", known_poses}};
 
 }  // namespace
 }  // namespace pose

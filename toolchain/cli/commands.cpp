@@ -19,6 +19,7 @@ void add_commands(CLI::App& app, int argc, const char* const* argv) {
   add_avatar_command(app);
   add_basis_command(app);
   add_pack_command(app);
+  add_known_poses_command(app);
   add_population_command(app);
   add_sampler_command(app);
   add_features_command(app);

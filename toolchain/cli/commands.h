@@ -19,12 +19,14 @@ void add_check_capture_command(CLI::App& app);
 void add_avatar_command(CLI::App& app);
 void add_basis_command(CLI::App& app);
 void add_pack_command(CLI::App& app);
+void add_known_poses_command(CLI::App& app);
 void add_population_command(CLI::App& app);
 void add_sampler_command(CLI::App& app);
 void add_features_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_evaluate_members_command(CLI::App& evaluate);  // below evaluate, as the others
 void add_evaluate_distance_command(CLI::App& evaluate);
+void add_evaluate_poses_command(CLI::App& evaluate);
 void add_evaluate_generation_command(CLI::App& evaluate);
 void add_evaluate_sampling_command(CLI::App& evaluate);
 void add_evaluate_features_command(CLI::App& evaluate);

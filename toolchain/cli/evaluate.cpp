@@ -281,6 +281,7 @@ void add_evaluate_command(CLI::App& app) {
   population->callback([arguments] { run_population(*arguments); });
 
   add_evaluate_distance_command(*command);
+  add_evaluate_poses_command(*command);
   add_evaluate_members_command(*command);
   add_evaluate_generation_command(*command);
   add_evaluate_sampling_command(*command);

@@ -106,7 +106,7 @@ void QuantisedSampler::take_what_members_share(const Population& population) {
   sampler_.traits() = first->traits();  // a member's golden frame has no picture
   if (population.pose_joints.empty()) return;
   pooled_pose_statistics(population, pose_mean_, pose_covariance_);
-  sampler_.pose_statistics = {population.pose_joints, pose_mean_, pose_covariance_};
+  sampler_.pose_statistics = {population.pose_joints, pose_mean_, pose_covariance_, {}};
 }
 
 // Everybody's network goes with the sampler, in floats and by the ranges in fixed point.

@@ -13,6 +13,7 @@
 #include "toolchain/json_number.h"
 #include "toolchain/measure/resized.h"
 #include "toolchain/pictures/avatar_pictures.h"
+#include "toolchain/reconstruction/retaken.h"
 #include "toolchain/train/interrupt.h"
 #include "toolchain/train/progress.h"
 
@@ -79,16 +80,6 @@ Camera scaled(Camera camera, double scale) {
   return camera;
 }
 
-Picture picture_of(const capture::Rendering& rendering) {
-  Picture picture{rendering.colour.width_px, rendering.colour.height_px,
-                  std::vector<uint8_t>(rendering.alpha.pixels.size() * 4)};
-  for (size_t i = 0; i < rendering.alpha.pixels.size(); ++i) {
-    std::copy_n(&rendering.colour.pixels[3 * i], 3, &picture.rgba[4 * i]);
-    picture.rgba[4 * i + 3] = rendering.alpha.pixels[i];
-  }
-  return picture;
-}
-
 std::vector<size_t> choose_frames(const dataset::Dataset& data, uint32_t count) {
   std::vector<size_t> held_out, chosen;
   for (size_t frame = 0; frame < data.frames().size(); ++frame) {
@@ -98,21 +89,6 @@ std::vector<size_t> choose_frames(const dataset::Dataset& data, uint32_t count) 
     throw InputError(data.directory() + ": no pose is held out, so there is nothing to evaluate");
   const size_t n = std::min<size_t>(count, held_out.size());
   for (size_t i = 0; i < n; ++i) chosen.push_back(held_out[i * held_out.size() / n]);
-  return chosen;
-}
-
-std::vector<size_t> choose_cameras(const dataset::Dataset& data, dataset::Framing framing,
-                                   uint32_t count) {
-  std::vector<size_t> chosen;
-  for (const bool held_out : {true, false}) {
-    std::vector<size_t> cameras;
-    for (size_t c = 0; c < data.cameras().size(); ++c) {
-      const dataset::CaptureCamera& camera = data.cameras()[c];
-      if (camera.framing == framing && camera.held_out == held_out) cameras.push_back(c);
-    }
-    const size_t n = std::min<size_t>(count - chosen.size(), cameras.size());
-    for (size_t i = 0; i < n; ++i) chosen.push_back(cameras[i * cameras.size() / n]);
-  }
   return chosen;
 }
 
@@ -259,8 +235,7 @@ class Comparison {
 }  // namespace
 
 nlohmann::json evaluate_distance(train::TrainedAvatar& avatar, const DistanceOptions& options) {
-  if (avatar.data().sources().empty())
-    throw InputError(avatar.data().directory() + ": its person cannot be photographed again");
+  check_retakable(avatar.data());
   return Comparison(avatar, options).run();
 }
 

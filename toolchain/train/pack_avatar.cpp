@@ -1,6 +1,7 @@
 #include "toolchain/train/pack_avatar.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 
@@ -10,13 +11,12 @@
 #include "toolchain/tensor_operations.h"
 #include "toolchain/train/avatar_model.h"
 #include "toolchain/train/facing.h"
+#include "toolchain/train/known_poses.h"
 
 namespace figurine::train {
 
 namespace {
 
-constexpr uint32_t kBodyJoints = 21;  // SMPL-X joints 1..21: body without root, hands and face
-constexpr double kPoseDeviation_rad = 0.03;  // added to every feature's spread
 constexpr uint32_t kGoldenSize_px = 256;
 constexpr std::array<float, 3> kGoldenBackground{0.5f, 0.5f, 0.5f};
 
@@ -77,7 +77,7 @@ std::vector<QualityMetric> read_quality(const RunDirectory& run) {
   std::vector<QualityMetric> quality;
   if (!std::filesystem::exists(run.evaluation())) return quality;
   const nlohmann::json report = read_json(run.evaluation());
-  const auto add = [&](const char* name, const char* group, const char* metric) {
+  const auto add = [&](const std::string& name, const char* group, const char* metric) {
     const auto found = report.find(group);
     if (found == report.end() || !found->is_object()) return;
     const auto value = found->find(metric);
@@ -91,9 +91,12 @@ std::vector<QualityMetric> read_quality(const RunDirectory& run) {
   add("highpass_ratio", "held_out_poses", "highpass_ratio");
   add("highpass_correlation", "held_out_poses", "highpass_correlation");
   add("filled_share", "held_out_poses", "filled_share");
-  for (const char* metric :
-       {"bust_psnr_db", "bust_head_psnr_db", "bust_highpass_ratio", "bust_highpass_correlation"})
-    add(metric, "held_out_poses", metric);
+  constexpr std::array kBust{"bust_psnr_db", "bust_head_psnr_db", "bust_highpass_ratio",
+                             "bust_highpass_correlation"};
+  for (const char* metric : kBust) add(metric, "held_out_poses", metric);
+  for (const char* metric : {"highpass_ratio", "highpass_correlation"})
+    add("view_" + std::string(metric), "held_out_views", metric);
+  for (const char* metric : kBust) add("view_" + std::string(metric), "held_out_views", metric);
   return quality;
 }
 
@@ -142,48 +145,6 @@ Provenance make_provenance(const TrainedAvatar& avatar, const RunDirectory& run,
 }
 
 }  // namespace
-
-std::array<double, 3> rotation_vector(const float* wxyz) {
-  double q[4], length = 0;
-  for (int k = 0; k < 4; ++k) {
-    q[k] = wxyz[k];
-    length += q[k] * q[k];
-  }
-  length = std::sqrt(length);
-  const double sign = q[0] < 0 ? -1 : 1;  // q and -q are one rotation; this one turns by at most pi
-  for (double& value : q) value *= sign / length;
-  const double sine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  const double factor = sine < 1e-9 ? 2.0 : 2 * std::atan2(sine, q[0]) / sine;
-  return {factor * q[1], factor * q[2], factor * q[3]};
-}
-
-PoseFeatures pose_features(const std::vector<std::vector<float>>& rotations, uint32_t joint_count) {
-  PoseFeatures features;
-  const uint32_t joints = std::min(kBodyJoints, joint_count - 1);
-  for (uint32_t j = 1; j <= joints; ++j) features.joints.push_back(static_cast<uint8_t>(j));
-  const size_t size = 3 * size_t(joints);
-  std::vector<double> mean(size, 0), covariance(size * size, 0);
-  std::vector<std::vector<double>> rows;
-  for (const std::vector<float>& pose : rotations) {
-    std::vector<double>& row = rows.emplace_back();
-    for (uint8_t joint : features.joints) {
-      for (double value : rotation_vector(&pose[4 * size_t(joint)])) row.push_back(value);
-    }
-    for (size_t i = 0; i < size; ++i) mean[i] += row[i] / static_cast<double>(rotations.size());
-  }
-  for (const std::vector<double>& row : rows) {
-    for (size_t i = 0; i < size; ++i) {
-      for (size_t k = 0; k < size; ++k)
-        covariance[i * size + k] +=
-            (row[i] - mean[i]) * (row[k] - mean[k]) / static_cast<double>(rows.size());
-    }
-  }
-  for (size_t i = 0; i < size; ++i)
-    covariance[i * size + i] += kPoseDeviation_rad * kPoseDeviation_rad;
-  features.mean.assign(mean.begin(), mean.end());
-  features.covariance.assign(covariance.begin(), covariance.end());
-  return features;
-}
 
 GoldenView choose_golden_view(const TrainedAvatar& avatar) {
   const dataset::Dataset& data = avatar.data();
@@ -242,7 +203,7 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
   for (const dataset::CaptureFrame& frame : avatar.data().frames()) {
     if (frame.split == dataset::FrameSplit::kTrain) rotations.push_back(frame.rotations);
   }
-  const PoseFeatures features = pose_features(rotations, avatar.body().joint_count());
+  const KnownPoseStatistics known = known_poses(rotations, avatar.body().joint_count());
   const GoldenView view = choose_golden_view(avatar);
   const bool has_picture = options.golden && options.float_weights && options.network;
   const std::vector<std::byte> png =
@@ -275,7 +236,7 @@ std::vector<std::byte> pack_avatar(TrainedAvatar& avatar, const RunDirectory& ru
     content.smallest_extents = extents->view();
   content.antialiased = settings.antialiased;
   // What is learnt from poses is the network.
-  if (has_network) content.pose_statistics = {features.joints, features.mean, features.covariance};
+  if (has_network) content.pose_statistics = known.view();
   const figurine::Budget budget{.peak_memory_bytes = options.peak_memory_bytes,
                                 .macs_per_frame = macs,
                                 .gaussians = avatar.body().texel_count()};

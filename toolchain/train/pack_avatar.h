@@ -39,18 +39,6 @@ struct GoldenView {
 };
 GoldenView choose_golden_view(const TrainedAvatar& avatar);
 
-// Features of PoseStatistics: rotation vectors of the 21 SMPL-X body joints, fewer for a smaller
-// skeleton. covariance: [3P,3P], plus (0.03 rad)^2 on the diagonal, so that a joint that never
-// moved in training still has a scale. poses: [F] of J rotations each.
-struct PoseFeatures {
-  std::vector<uint8_t> joints;
-  std::vector<float> mean, covariance;
-};
-PoseFeatures pose_features(const std::vector<std::vector<float>>& rotations, uint32_t joint_count);
-
-// The rotation vector (axis times angle, at most pi long) of a quaternion of any length, wxyz.
-std::array<double, 3> rotation_vector(const float* wxyz);
-
 // The package's bytes; the golden picture is of the static part as the package holds it. Throws
 // InputError: a run with frozen pose (a device always poses) or static colours as a sum, missing
 // consent, no weights, a network left out that the run has changed.

@@ -34,7 +34,8 @@ class DeviceAvatar {
   // Runs the network; what is drawn next is in this pose. Throws InputError on a pose that is not
   // one.
   void pose(const PoseView& pose);
-  // World centres of the posed Gaussians, [n,3]; valid until the next pose.
+  // World centres of the posed Gaussians, [N,3] in the order of the body's texels; valid until the
+  // next pose.
   std::span<const float> centres_m() const { return position_m_; }
   // The posed avatar, moved by `offset_m`.
   measure::Picture draw(const Camera& camera, const std::array<float, 3>& offset_m = {0, 0, 0});

@@ -38,12 +38,18 @@ struct HeadDecoding {
 };
 
 // Mean and covariance of the training poses' body rotations, for telling how unusual a pose is:
-// features are rotation vectors (axis times angle, radians) of the listed joints, concatenated.
+// features are rotation vectors (axis times angle, radians) of the listed joints, of the root that
+// of its tilt, concatenated (figurine/known_poses.h).
 struct PoseStatistics {
   std::vector<uint8_t> joints;        // [P]
   std::span<const float> mean;        // [3P]
   std::span<const float> covariance;  // [3P,3P] symmetric, regularised to be positive definite
+  // [Q] of the training poses, each measured against the others: value k is a distance that a share
+  // of k / (Q - 1) of them do not exceed. Empty: not said, and no distance means anything.
+  std::span<const float> distances;
 };
+inline constexpr size_t kMaxPoseDistances = 1025;
+inline constexpr float kMaxPoseDistance = 1e6f;
 
 // Which channels of the head a static part may hold: offset, log-scale, quaternion, opacity, and
 // the three colours of SH degree 0.

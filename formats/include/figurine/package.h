@@ -41,6 +41,10 @@ inline constexpr uint64_t kFeatureStaticPart = uint64_t{1} << 2;
 // An avatar has smallest extents, or is to be splatted antialiased, or both.
 inline constexpr uint64_t kFeatureFilters = uint64_t{1} << 3;
 
+// Bits of the header's optional features.
+// There is a table of the training poses' distances (PoseStatistics::distances).
+inline constexpr uint64_t kOptionalPoseDistances = uint64_t{1} << 0;
+
 enum class PackageKind : uint8_t {
   kBody = 1,
   kAvatar = 2,
@@ -124,11 +128,13 @@ struct OpenOptions {
   bool pose_statistics = true;  // of an avatar
   bool mesh_places = true;      // Body::texel_triangle, texel_barycentric
 
-  // What drawing takes. precision: that networks will run in.
-  static OpenOptions for_drawing(std::optional<Precision> precision = Precision::kFixedPoint) {
+  // What drawing takes. precision: that networks will run in. keep_to_known: frames may ask for
+  // FrameAvatar::keep_to_known, or their caller for how unusual poses are.
+  static OpenOptions for_drawing(std::optional<Precision> precision = Precision::kFixedPoint,
+                                 bool keep_to_known = false) {
     return {.precision = precision,
             .golden_picture = false,
-            .pose_statistics = false,
+            .pose_statistics = keep_to_known,
             .mesh_places = false};
   }
 };

@@ -8,6 +8,7 @@
 
 #include "figurine/detail/memory_reserve.h"
 #include "figurine/gaussian.h"
+#include "figurine/known_poses.h"
 #include "figurine/texel_grid.h"
 #include "formats/src/package/content.h"
 
@@ -312,12 +313,15 @@ Status read_pose_statistics(const schema::PoseStatistics& table, std::string_vie
   const uint32_t n = static_cast<uint32_t>(out.joints.size()) * 3;
   FIG_RETURN_IF_ERROR(blobs.read("pose.mean", {n}, out.mean));
   FIG_RETURN_IF_ERROR(blobs.read("pose.covariance", {n, n}, out.covariance));
+  FIG_RETURN_IF_ERROR(
+      blobs.read("pose.distances", {BlobReader::kAny}, out.distances, BlobReader::kMayBeAbsent));
   if (!blobs.wanted().pose_statistics) {
     out = {};
     return {};
   }
   FIG_RETURN_IF_ERROR(check_magnitude(out.mean, "pose.mean", 100));
-  return check_covariance(out.covariance, n, "pose.covariance");
+  FIG_RETURN_IF_ERROR(check_covariance(out.covariance, n, "pose.covariance"));
+  return out.distances.empty() ? Status() : validate_pose_distances(out.distances);
 }
 
 namespace {

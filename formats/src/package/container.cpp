@@ -143,7 +143,8 @@ bool WantedParts::holds(std::string_view name) const {
   if (name.starts_with("network.")) return float_weights;
   if (name.starts_with("fixed.")) return fixed_point;
   if (name == "golden.png") return golden_picture;
-  if (name == "pose.mean" || name == "pose.covariance") return pose_statistics;
+  if (name == "pose.mean" || name == "pose.covariance" || name == "pose.distances")
+    return pose_statistics;
   if (name == "body.texel_triangle" || name == "body.texel_barycentric") return mesh_places;
   return true;
 }

@@ -99,6 +99,11 @@ struct FrameAvatar {
   // The same person in fewer texels and a smaller network, or none, for when the figure is small
   // (Approximation::coarse_below_px): of another body with the same joints.
   std::optional<AvatarId> coarse = std::nullopt;
+  // Where the pose is farther out than 95 % of those that the avatar was trained on, its network is
+  // shown one that is nearer (figurine/known_poses.h), while skeleton, skinning and everything
+  // behind follow the true pose. Without a table of distances in the package (PoseStatistics),
+  // nothing changes. The same pixels on every CPU and for any number of threads, as without.
+  bool keep_to_known = false;
 };
 
 struct Frame {
@@ -137,6 +142,7 @@ struct FrameStatistics {
   uint64_t stale_networks = 0;  // runs that Approximation's network_below_px or _interval saved
   uint64_t coarse_avatars = 0;  // drawn by their FrameAvatar::coarse
   uint64_t averted_texels = 0;  // left out by Approximation::averted_above
+  uint64_t pulled_poses = 0;    // of avatars whose network was shown another (keep_to_known)
   struct LeftOut {
     uint64_t hidden_texels = 0;
     uint64_t transparent = 0, outside = 0;  // Gaussians

@@ -20,6 +20,7 @@
 
 #include "figurine/frame.h"
 #include "figurine/isa.h"
+#include "figurine/known_poses.h"
 #include "figurine/package.h"
 #include "figurine/status.h"
 #include "figurine/threads.h"
@@ -82,6 +83,11 @@ class Renderer {
   // extents are in them, whether it is antialiased (Avatar) is for the caller to say. Valid until
   // the next call. For export and inspection.
   Result<GaussianView> pose_avatar(AvatarId avatar, const PoseView& pose);
+
+  // How unusual a pose is to an avatar. None if its package has no table of distances
+  // (PoseStatistics), or was opened without it. kInvalidArgument on an unsound pose, or if there is
+  // no avatar of this id. About 10 us; allocates nothing.
+  Result<std::optional<PoseRarity>> pose_rarity(AvatarId avatar, const PoseView& pose) const;
 
   Isa isa() const;                            // of the kernels that run
   const FrameStatistics& statistics() const;  // of the last frame

@@ -20,8 +20,17 @@ inline size_t content_bytes(const Network& network, size_t groups) {
   return bytes;
 }
 
+// What KnownPoses copies and factorises.
+inline size_t content_bytes(const PoseStatistics& statistics) {
+  if (statistics.distances.empty()) return 0;
+  const size_t features = 3 * statistics.joints.size();
+  return (features * (features + 3) / 2) * sizeof(double) + statistics.distances.size_bytes() +
+         statistics.joints.size();
+}
+
 inline size_t content_bytes(const Avatar& avatar) {
-  return content_bytes(avatar.network, avatar.static_part.groups.size());
+  return content_bytes(avatar.network, avatar.static_part.groups.size()) +
+         content_bytes(avatar.pose_statistics);
 }
 
 inline size_t content_bytes(const Sampler& sampler) {

@@ -229,8 +229,10 @@ fig_status fig_package_open(const void* bytes, size_t size_bytes,
     if (size_bytes > 0) std::memcpy(copy.data(), bytes, size_bytes);
     content = {copy.data(), size_bytes};
   }
-  Result<Package> opened = Package::open(
-      content, name, read.for_drawing != 0 ? OpenOptions::for_drawing() : OpenOptions{});
+  Result<Package> opened =
+      Package::open(content, name,
+                    read.for_drawing != 0 ? OpenOptions::for_drawing(Precision::kFixedPoint, true)
+                                          : OpenOptions{});
   if (!opened.ok()) return report(opened.status());
   std::unique_ptr<PackageObject> object(
       new (std::nothrow) PackageObject(std::move(copy), std::move(opened).value()));

@@ -157,7 +157,8 @@ Status read_avatar(const fig_frame& frame, size_t i, fig_renderer renderer, Fram
   if (!id.ok()) return id.status();
   const Result<PoseView> pose = pose_of(given.pose);
   if (!pose.ok()) return pose.status();
-  seen = FrameAvatar{.avatar = *id, .pose = *pose};
+  if (given.keep_to_known > 1) return invalid("keep_to_known: neither 0 nor 1");
+  seen = FrameAvatar{.avatar = *id, .pose = *pose, .keep_to_known = given.keep_to_known != 0};
   if (given.coarse.id == 0) return {};
   const Result<AvatarId> coarse = avatar_of(renderer, given.coarse);
   if (!coarse.ok()) return coarse.status().within("coarse");
@@ -335,6 +336,15 @@ static fig_frame default_frame() {
 }
 void fig_set_default_frame(fig_frame* value, size_t struct_bytes) {
   set_default(default_frame(), value, struct_bytes);
+}
+
+static fig_pose_rarity default_pose_rarity() {
+  fig_pose_rarity rarity{};
+  rarity.struct_bytes = sizeof rarity;
+  return rarity;
+}
+void fig_set_default_pose_rarity(fig_pose_rarity* value, size_t struct_bytes) {
+  set_default(default_pose_rarity(), value, struct_bytes);
 }
 
 static fig_statistics default_statistics() {
@@ -518,6 +528,28 @@ fig_status fig_renderer_pose_avatar(fig_renderer renderer, fig_avatar avatar, co
   return FIG_OK;
 }
 
+fig_status fig_renderer_pose_rarity(fig_renderer renderer, fig_avatar avatar, const fig_pose* pose,
+                                    fig_pose_rarity* rarity) {
+  FIG_RESERVE_OR_REPORT();
+  FIG_REPORT_IF_ERROR(check_struct(rarity, "pose rarity"));
+  const Result<Pin<RendererObject>> pinned = pin_renderer(renderer);
+  if (!pinned.ok()) return report(pinned.status());
+  const Result<AvatarId> id = avatar_of(renderer, avatar);
+  if (!id.ok()) return report(id.status());
+  const Result<PoseView> wanted = pose_of(pose);
+  if (!wanted.ok()) return report(wanted.status());
+  const Result<std::optional<PoseRarity>> found = (*pinned)->renderer->pose_rarity(*id, *wanted);
+  if (!found.ok()) return report(found.status());
+  fig_pose_rarity whole = fig_default_pose_rarity();
+  if (found->has_value()) {
+    whole.known = 1;
+    whole.distance = (*found)->distance;
+    whole.share_beyond = (*found)->share_beyond;
+  }
+  fill_struct(whole, rarity);
+  return FIG_OK;
+}
+
 fig_status fig_renderer_statistics(fig_renderer renderer, fig_statistics* statistics) {
   FIG_RESERVE_OR_REPORT();
   FIG_REPORT_IF_ERROR(check_struct(statistics, "statistics"));
@@ -545,6 +577,7 @@ fig_status fig_renderer_statistics(fig_renderer renderer, fig_statistics* statis
   whole.outside = of_frame.left_out.outside;
   whole.missed_tiles = of_frame.left_out.missed_tiles;
   whole.stopped = of_frame.left_out.stopped;
+  whole.pulled_poses = of_frame.pulled_poses;
   fill_struct(whole, statistics);
   return FIG_OK;
 }

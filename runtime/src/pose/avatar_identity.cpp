@@ -88,6 +88,11 @@ AvatarIdentity identify(const Avatar& avatar, const Body& body, Precision precis
   words.add(avatar.smallest_extents.codes);
   words.add(avatar.smallest_extents.scale_m);
   words.add(uint64_t{avatar.antialiased});
+  if (const PoseStatistics& poses = avatar.pose_statistics; !poses.distances.empty()) {
+    words.add(std::span<const uint8_t>(poses.joints));
+    for (const std::span<const float> values : {poses.mean, poses.covariance, poses.distances})
+      words.add(values);
+  }
   return words.hash();
 }
 

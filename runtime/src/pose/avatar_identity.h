@@ -14,7 +14,8 @@ namespace figurine {
 
 using AvatarIdentity = std::array<uint64_t, 2>;  // XXH3-128 (low, high)
 
-// Names, pose statistics and golden frames do not count: nothing of a frame depends on them.
+// Names, golden frames and pose statistics without a table of distances do not count: nothing of a
+// frame depends on them.
 AvatarIdentity identify(const Avatar& avatar, const Body& body, Precision precision);
 
 }  // namespace figurine

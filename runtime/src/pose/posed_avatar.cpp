@@ -27,7 +27,7 @@ uint32_t texels_of_block(const BodyBlocks& blocks, uint32_t block) {
 
 bool PoseScratch::ensure(uint32_t joints, uint32_t blocks) {
   return transforms.ensure(joints, blocks) && own_from_rest.ensure(joints) &&
-         left_out.ensure(blocks) && wanted.ensure(blocks);
+         left_out.ensure(blocks) && wanted.ensure(blocks) && pulled.ensure(size_t{4} * joints);
 }
 
 Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, const Body& body,
@@ -44,6 +44,7 @@ Result<std::unique_ptr<PosedAvatar>> PosedAvatar::create(const Avatar& avatar, c
     return Status(StatusCode::kCorrupt, "avatar: neither a network nor a static part");
   }
   FIG_RETURN_IF_ERROR(posed->shape(avatar));
+  FIG_RETURN_IF_ERROR(posed->learn_poses(avatar.pose_statistics));
   FIG_RETURN_IF_ERROR(posed->static_blocks_.ensure(avatar.static_part, body));
   FIG_RETURN_IF_ERROR(posed->extent_blocks_.ensure(avatar.smallest_extents, body));
   return posed;
@@ -65,6 +66,21 @@ Status PosedAvatar::prepare_network(const Avatar& avatar, std::shared_ptr<const 
       AvatarNetwork::create(avatar, *grid_, precision_, pool_, kernels_);
   if (!network.ok()) return network.status();
   network_ = std::move(network).value();
+  return {};
+}
+
+// Without a table of distances nothing is known: no distance means anything.
+Status PosedAvatar::learn_poses(const PoseStatistics& statistics) {
+  if (statistics.distances.empty()) return {};
+  for (const uint8_t joint : statistics.joints) {
+    if (joint >= body_.joint_count()) {
+      return Status(StatusCode::kCorrupt,
+                    "avatar: its pose statistics name joint " + std::to_string(joint));
+    }
+  }
+  Result<KnownPoses> known = KnownPoses::create(statistics);
+  if (!known.ok()) return known.status().within("avatar");
+  known_poses_ = std::move(known).value();
   return {};
 }
 
@@ -166,7 +182,21 @@ bool PosedAvatar::is_continued(const PoseJob& job) const {
   return line_.begun() && last_run_.done && job.avatar && job.avatar == last_run_.avatar;
 }
 
-NetworkUse PosedAvatar::choose_use(const PoseJob& job, const PoseScratch& scratch) const {
+std::optional<PoseRarity> PosedAvatar::rarity(const PoseView& pose) const {
+  if (known_poses_.empty()) return std::nullopt;
+  return known_poses_.rarity(pose.rotations);
+}
+
+// What the network is shown: the pose itself, or one in the scratch.
+PoseView PosedAvatar::shown_pose(const PoseJob& job, PoseScratch& scratch) const {
+  const std::span<float> pulled = scratch.pulled.span(job.pose.rotations.size());
+  scratch.is_pulled = job.keep_to_known && network_ != nullptr && !known_poses_.empty() &&
+                      known_poses_.pull(job.pose.rotations, pulled);
+  return scratch.is_pulled ? PoseView{job.pose.root_translation_m, pulled} : job.pose;
+}
+
+NetworkUse PosedAvatar::choose_use(const PoseJob& job, const PoseView& shown,
+                                   const PoseScratch& scratch) const {
   if (network_ == nullptr || scratch.wanted_count == 0) return NetworkUse::kNone;
   if (const uint32_t interval = job.approximation.network_interval; interval > 1) {
     const bool due =
@@ -175,7 +205,7 @@ NetworkUse PosedAvatar::choose_use(const PoseJob& job, const PoseScratch& scratc
   }
   // What is drawn with a line is not the last run's outputs.
   if (!last_run_.done || line_.begun()) return NetworkUse::kRun;
-  if (job.leave_out.unchanged_networks && is_last_pose(job.pose)) return NetworkUse::kUnchanged;
+  if (job.leave_out.unchanged_networks && is_last_pose(shown)) return NetworkUse::kUnchanged;
   const bool stale =
       job.avatar && job.avatar == last_run_.avatar && is_small(job, scratch.transforms);
   return stale ? NetworkUse::kStale : NetworkUse::kRun;
@@ -202,33 +232,48 @@ Status PosedAvatar::evaluate_network(const PoseJob& job, const PoseScratch& scra
   return {};
 }
 
-Status PosedAvatar::run_network(const PoseJob& job, const PoseScratch& scratch, StageClock& clock) {
+// Maps of another pose take its transforms, which then make room for the true ones again: it costs
+// a rare frame more time, and no frame memory.
+void PosedAvatar::draw_maps_of(const PoseJob& job, const PoseView& shown, PoseScratch& scratch) {
+  const auto transform = [&](const PoseView& pose) {
+    scratch.transforms.pose(body_, blocks_, joint_position_m_.span(size_t{3} * body_.joint_count()),
+                            pose, pool_, kernels_);
+  };
+  if (scratch.is_pulled) transform(shown);
+  draw_maps(*grid_, blocks_, scratch.transforms, root_position(body_.mean_skeleton(), shown),
+            statistics_, network_->input(), pool_, kernels_);
+  if (scratch.is_pulled) transform(job.pose);
+}
+
+Status PosedAvatar::run_network(const PoseJob& job, const PoseView& shown, PoseScratch& scratch,
+                                StageClock& clock) {
   {
     const StageClock::Scope timed(clock, Stage::kMaps);
-    draw_maps(*grid_, blocks_, scratch.transforms, root_position(body_.mean_skeleton(), job.pose),
-              statistics_, network_->input(), pool_, kernels_);
+    draw_maps_of(job, shown, scratch);
   }
   const StageClock::Scope timed(clock, Stage::kNetwork);
   const Status evaluated = evaluate_network(job, scratch);
   last_run_.done = evaluated.ok();
   FIG_RETURN_IF_ERROR(evaluated);
-  std::copy(job.pose.rotations.begin(), job.pose.rotations.end(), last_run_.rotations.data());
-  last_run_.root_translation_m = job.pose.root_translation_m;
+  std::copy(shown.rotations.begin(), shown.rotations.end(), last_run_.rotations.data());
+  last_run_.root_translation_m = shown.root_translation_m;
   last_run_.avatar = job.avatar;
   return {};
 }
 
 Result<NetworkUse> PosedAvatar::pose(const PoseJob& job, PoseScratch& scratch, StageClock& clock) {
   NetworkUse use = NetworkUse::kNone;
+  PoseView shown;
   {
     const StageClock::Scope timed(clock, Stage::kSkin);
     scratch.transforms.pose(body_, blocks_, joint_position_m_.span(size_t{3} * body_.joint_count()),
                             job.pose, pool_, kernels_);
     select_blocks(job, scratch);
-    use = choose_use(job, scratch);
+    shown = shown_pose(job, scratch);
+    use = choose_use(job, shown, scratch);
   }
   if (use == NetworkUse::kRun) {
-    FIG_RETURN_IF_ERROR(run_network(job, scratch, clock));
+    FIG_RETURN_IF_ERROR(run_network(job, shown, scratch, clock));
   } else if (use != NetworkUse::kNone) {
     const StageClock::Scope timed(clock, Stage::kNetwork);
     if (use == NetworkUse::kContinued) {
@@ -291,8 +336,8 @@ uint32_t PosedAvatar::decode(const PoseScratch& scratch, uint32_t block, uint32_
 
 uint64_t PosedAvatar::memory_bytes() const {
   return (network_ == nullptr ? 0 : network_->memory_bytes()) + last_run_.rotations.memory_bytes() +
-         line_.memory_bytes() + joint_position_m_.memory_bytes() + canonical_.memory_bytes() +
-         static_blocks_.memory_bytes() + extent_blocks_.memory_bytes();
+         line_.memory_bytes() + known_poses_.memory_bytes() + joint_position_m_.memory_bytes() +
+         canonical_.memory_bytes() + static_blocks_.memory_bytes() + extent_blocks_.memory_bytes();
 }
 
 }  // namespace figurine

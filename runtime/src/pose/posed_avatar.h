@@ -1,7 +1,8 @@
 // One avatar, ready to be posed: its network, its person's canonical texels and joints, and the
 // plan of a frame from a pose to world-space Gaussians.
 //
-//   pose -> transforms -> which texels are wanted -> maps of the mean template -> network
+//   pose -> transforms -> which texels are wanted -> maps of the mean template, of this pose or of
+//        one that the network knows better -> network
 //        -> wanted blocks: heads between a coarser network's, static part, decoding and linear
 //        blend
 //           skinning -> Gaussians
@@ -20,6 +21,7 @@
 #include "figurine/avatar.h"
 #include "figurine/body.h"
 #include "figurine/frame.h"
+#include "figurine/known_poses.h"
 #include "runtime/src/base/memory.h"
 #include "runtime/src/base/stage_clock.h"
 #include "runtime/src/base/thread_pool.h"
@@ -41,6 +43,8 @@ struct PoseScratch {
   Buffer<Affine> own_from_rest;  // [J] of a figure whose size is asked for
   Buffer<uint32_t> left_out;     // [blocks] a bit a lane
   Buffer<uint32_t> wanted;       // [blocks] the wanted ones, ascending
+  Buffer<float> pulled;          // [J,4] what the network is shown, if not the pose itself
+  bool is_pulled = false;
   uint32_t wanted_count = 0;
   uint64_t hidden_texels = 0, averted_texels = 0;
 
@@ -48,7 +52,7 @@ struct PoseScratch {
   std::span<const uint32_t> wanted_blocks() const { return wanted.span(wanted_count); }
   uint64_t memory_bytes() const {
     return transforms.memory_bytes() + own_from_rest.memory_bytes() + left_out.memory_bytes() +
-           wanted.memory_bytes();
+           wanted.memory_bytes() + pulled.memory_bytes();
   }
 };
 
@@ -58,6 +62,7 @@ struct PoseJob {
   // Whose it is, equal avatars sharing a PosedAvatar. None: that of no frame, which no later pose
   // keeps anything of that is not exact.
   std::optional<AvatarId> avatar;
+  bool keep_to_known = false;           // FrameAvatar's
   const kernels::View* view = nullptr;  // null: all texels are wanted
   LeaveOut leave_out;
   Approximation approximation;
@@ -91,6 +96,8 @@ class PosedAvatar {
   bool antialiased() const { return antialiased_; }
   Precision precision() const { return precision_; }
   uint64_t macs() const { return network_ == nullptr ? 0 : network_->macs(); }
+  // None without a table of distances. The pose must be valid.
+  std::optional<PoseRarity> rarity(const PoseView& pose) const;
   // The network's; null without one.
   const std::shared_ptr<const BodyGrid>& grid() const { return grid_; }
 
@@ -122,17 +129,22 @@ class PosedAvatar {
         antialiased_(avatar.antialiased) {}
 
   Status shape(const Avatar& avatar);
+  Status learn_poses(const PoseStatistics& statistics);
   Status prepare_network(const Avatar& avatar, std::shared_ptr<const BodyGrid> grid);
   void select_blocks(const PoseJob& job, PoseScratch& scratch) const;
-  NetworkUse choose_use(const PoseJob& job, const PoseScratch& scratch) const;
+  PoseView shown_pose(const PoseJob& job, PoseScratch& scratch) const;
+  NetworkUse choose_use(const PoseJob& job, const PoseView& shown,
+                        const PoseScratch& scratch) const;
   bool is_continued(const PoseJob& job) const;
   bool is_last_pose(const PoseView& pose) const;
   bool is_small(const PoseJob& job, const Transforms& transforms) const;
-  Status run_network(const PoseJob& job, const PoseScratch& scratch, StageClock& clock);
+  void draw_maps_of(const PoseJob& job, const PoseView& shown, PoseScratch& scratch);
+  Status run_network(const PoseJob& job, const PoseView& shown, PoseScratch& scratch,
+                     StageClock& clock);
   Status evaluate_network(const PoseJob& job, const PoseScratch& scratch);
   void find_heads(uint32_t block, kernels::DecodeSkinJob& job) const;
 
-  // Which pose the network's last run was for.
+  // Which pose the network's last run was for, as it was shown.
   struct LastRun {
     bool done = false;
     std::optional<AvatarId> avatar;
@@ -153,6 +165,7 @@ class PosedAvatar {
   const bool antialiased_;
   std::shared_ptr<const BodyGrid> grid_;    // in front of what borrows from it
   std::unique_ptr<AvatarNetwork> network_;  // null: the static part is all there is
+  KnownPoses known_poses_;
   LastRun last_run_;
   OutputLine line_;
   Buffer<float> joint_position_m_;             // [J,3] of the template the Gaussians sit on

@@ -55,6 +55,24 @@ class LiveCommand : public testing::Test {
   TestFolder folder_;
 };
 
+TEST_F(LiveCommand, KeepsToKnownPosesWhereThatIsAskedFor) {
+  folder_.write("bent.json", R"({"joints": {"joint1": [0.9, 0, 0], "joint2": [0, 0, 0.9]}})");
+  const auto live = [&](const std::string& option) {
+    const ProgramRun result = run_figurine(
+        "live knowing.fgn --threads 1 --size 32x32 --pose bent.json --fps 30 --frames 3 --json "
+        "live.json -o live.y4m " +
+            option,
+        {.folder = folder_.path()});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return json();
+  };
+  const Json kept = live("--keep-to-known"), plain = live("");
+  EXPECT_EQ(kept["keep_to_known"], true);
+  EXPECT_EQ(kept["pulled_poses"], kept["shown_frames"]);
+  EXPECT_EQ(plain["keep_to_known"], false);
+  EXPECT_EQ(plain["pulled_poses"], 0);
+}
+
 TEST_F(LiveCommand, StreamsWholeFramesToStandardOutput) {
   const ProgramRun result = run("--pose motion.fgn --fps 8 --frames 4 --json live.json -o -");
   ASSERT_EQ(result.exit_code, 0) << result.err;

@@ -41,6 +41,23 @@ TEST_F(Omissions, SmallFiguresMayKeepWhatTheirNetworkSaid) {
   EXPECT_EQ(run("render avatar.fgn -o x.png --network-below-px -1").exit_code, 2);
 }
 
+TEST_F(Omissions, FiguresKeepToKnownPosesWhereThatIsAskedFor) {
+  const auto work = [&](const std::string& avatar, const std::string& option) {
+    const ProgramRun result = run("render " + avatar +
+                                  " --motion motion.fgn --frames 0:4 --size 64x64 --json -o "
+                                  "x_%02d.png " +
+                                  option);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return Json::parse(result.out);
+  };
+  EXPECT_EQ(work("knowing.fgn", "")["keep_to_known"], false);
+  EXPECT_EQ(work("knowing.fgn", "")["work"]["pulled_poses"], 0.0);
+  EXPECT_EQ(work("knowing.fgn", "--keep-to-known")["keep_to_known"], true);
+  // Frame 0 is the rest pose, which it knows.
+  EXPECT_EQ(work("knowing.fgn", "--keep-to-known")["work"]["pulled_poses"], 0.75);
+  EXPECT_EQ(work("avatar.fgn", "--keep-to-known")["work"]["pulled_poses"], 0.0);
+}
+
 TEST_F(Omissions, TheFastBlendIsAskedForByName) {
   const auto render = [&](const std::string& option) {
     const ProgramRun result = run("render avatar.fgn --size 64x64 --json -o x.png " + option);

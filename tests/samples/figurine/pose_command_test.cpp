@@ -76,6 +76,26 @@ TEST_F(PoseCommand, APoseOfOnesOwnTurnsWhatItNames) {
   EXPECT_NE(folder_.read("two.pfm"), folder_.read("same.pfm"));
 }
 
+TEST_F(PoseCommand, SaysHowUnusualThePoseIs) {
+  const ProgramRun rest =
+      run("pose --from motion.fgn --frame 0 --avatar knowing.fgn --json -o pose.json");
+  ASSERT_EQ(rest.exit_code, 0) << rest.err;
+  EXPECT_NE(rest.err.find("motion.fgn: frame 0: at distance 0.0, 100 % of the training poses are "
+                          "farther out"),
+            std::string::npos)
+      << rest.err;
+  EXPECT_EQ(Json::parse(rest.out)["rarity"]["share_beyond"], 1);
+  const ProgramRun bent =
+      run("pose --from motion.fgn --frame 3 --avatar knowing.fgn --json -o pose.json");
+  EXPECT_EQ(Json::parse(bent.out)["rarity"]["share_beyond"], 0);
+  EXPECT_GT(Json::parse(bent.out)["rarity"]["distance"], 2);
+  const ProgramRun silent = run("pose --from motion.fgn --avatar avatar.fgn -o none.json");
+  EXPECT_EQ(silent.exit_code, 1);
+  EXPECT_NE(silent.err.find("avatar.fgn: does not say which poses it knows"), std::string::npos)
+      << silent.err;
+  EXPECT_FALSE(folder_.has("none.json"));
+}
+
 TEST_F(PoseCommand, AWrongFileGetsOneLineAndNoPicture) {
   expect_refused(R"({"joints": {"joint22": [1, 0, 0, 0]}})", "nearest: joint2");
   expect_refused(R"({"joints": {"joint2": [0, 0, 0, 0]}})", "no length");

@@ -75,7 +75,7 @@ TEST(Inspect, PrintsTheDocumentedJsonOfEachKind) {
   for (const std::string kind :
        {"body", "avatar", "fixed_point_avatar", "static_avatar", "static_only_avatar",
         "filtered_avatar", "motion", "population", "half_population", "static_population",
-        "sampler", "static_sampler"}) {
+        "sampler", "static_sampler", "known_poses_avatar"}) {
     const Outcome run = inspect(kind + "_v1.fgn --json --tensors");
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");
@@ -135,6 +135,10 @@ TEST(Inspect, SaysWhatTakesHowManyBytes) {
         "antialiased       yes", "required 0xc"})
     EXPECT_TRUE(contains(filtered.out, words)) << words << "\n" << filtered.out;
   EXPECT_TRUE(contains(inspect("fixed_point_avatar_v1.fgn").out, "network in fixed point"));
+  EXPECT_TRUE(contains(inspect("known_poses_avatar_v1.fgn").out,
+                       "pose statistics   2 joints; training poses at 0.50 to 4.00, half of them "
+                       "within 1.00"));
+  EXPECT_TRUE(contains(inspect("avatar_v1.fgn").out, "pose statistics   1 joints"));
 }
 
 TEST(Inspect, ListsThePopulationsMembers) {
