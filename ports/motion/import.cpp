@@ -100,6 +100,26 @@ std::string figures(const RetargetReport& report, const MotionClip& clip) {
 
 }  // namespace
 
+Status set_neutral(const std::string& text, RetargetOptions& options) {
+  if (text == "first") {
+    options.neutral = Neutral::kFirstFrame;
+  } else if (text == "zero") {
+    options.neutral = Neutral::kZeroPose;
+  } else if (text == "axes") {
+    options.neutral = Neutral::kBoneAxes;
+  } else if (const auto frame = number<uint32_t>(text, 0, UINT32_MAX - 1, ""); frame.ok()) {
+    options.neutral = Neutral::kFrame;
+    options.neutral_frame = *frame;
+  } else {
+    return wrong("'" + text + "': neither first, zero, axes nor a frame's number");
+  }
+  return {};
+}
+
+std::string describe_motion(const RetargetReport& report, const MotionClip& clip) {
+  return figures(report, clip) + "; read: " + report.summary;
+}
+
 std::vector<TextOption> import_options(ImportSettings& settings) {
   RetargetOptions& retarget = settings.retarget;
   std::vector<TextOption> options;
@@ -127,21 +147,7 @@ std::vector<TextOption> import_options(ImportSettings& settings) {
        "The T-pose is the first frame, the zero pose (glTF: of the nodes), a frame by its number, "
        "or "
        "told by the bones' axes (glTF: axes); default: the one that is a T-pose",
-       false, [&retarget](const std::string& text) -> Status {
-         if (text == "first") {
-           retarget.neutral = Neutral::kFirstFrame;
-         } else if (text == "zero") {
-           retarget.neutral = Neutral::kZeroPose;
-         } else if (text == "axes") {
-           retarget.neutral = Neutral::kBoneAxes;
-         } else if (const auto frame = number<uint32_t>(text, 0, UINT32_MAX - 1, ""); frame.ok()) {
-           retarget.neutral = Neutral::kFrame;
-           retarget.neutral_frame = *frame;
-         } else {
-           return wrong("'" + text + "': neither first, zero, axes nor a frame's number");
-         }
-         return {};
-       }});
+       false, [&retarget](const std::string& text) { return set_neutral(text, retarget); }});
   options.push_back(number_option<uint32_t>(
       "--animation",
       "glTF: which of the file's animations, counted from 0; default: the first that moves the "

@@ -37,6 +37,11 @@ struct ImportedMotion {
   Provenance provenance;  // without the tool
 };
 
+// The T-pose of a clip, as --neutral says it: "first", "zero", "axes" or a frame's number.
+Status set_neutral(const std::string& text, RetargetOptions& options);
+// What came out of read_clip(), in one line: frames, rate, feet, bones, head, and what was read.
+std::string describe_motion(const RetargetReport& report, const MotionClip& clip);
+
 // body_hash: of the body's package. Errors name the file and the reason.
 Result<ImportedMotion> import_motion(const ImportSettings& settings, const figurine::Body& body,
                                      const std::array<uint64_t, 2>& body_hash);

@@ -16,9 +16,14 @@ name=${1:?edge or nano} folder=${2:-out/population}
 
 state=$folder/$name
 train population "toolchain/population/$name.json" ${MINUTES:+--stop-after "$MINUTES"} -o "$state"
-train evaluate members "$state/population.fgn" --body "$state/body.fgn" \
-  --wall "docs/population_$name.jpg" \
-  --interpolation "docs/interpolation_$name.jpg" -o "$state/report.json"
+pictures=(--wall "docs/population_$name.jpg" --bust-wall "docs/population_bust_$name.jpg"
+  --interpolation "docs/interpolation_$name.jpg")
+# Members are mixed by part where they have maps.
+if grep -q '"static_grids"' "toolchain/population/$name.json"; then
+  pictures+=(--part-mixtures "docs/population_parts_$name.jpg")
+fi
+train evaluate members "$state/population.fgn" --body "$state/body.fgn" "${pictures[@]}" \
+  -o "$state/report.json"
 scripts/run python3 scripts/experiments/population_report.py "$state" "$name" \
   docs/results/population.json "scripts/experiments/population.sh $name"
 # The ten worst on held-out poses, worst first: truth left, avatar right in every pair.

@@ -20,8 +20,9 @@ import results
 CORES = 2  # people are made side by side, one a core
 
 
+# None where it was not measured: in captures without cameras of busts, by tools of before.
 def metric(row, group, name):
-    return row["quality"][group][name]
+    return row["quality"][group].get(name)
 
 
 def describe(values, best=max):
@@ -42,22 +43,54 @@ def above_flat_db(row):
     return poses["psnr_db"] - poses["flat_psnr_db"]
 
 
+# Of held-out poses, and with `view_` before the name of held-out views.
+FIGURES = [
+    "highpass_ratio",
+    "highpass_correlation",
+    "bust_psnr_db",
+    "bust_head_psnr_db",
+    "bust_highpass_ratio",
+    "bust_highpass_correlation",
+]
+
+
 def spread(rows):
+    poses = lambda name: describe([metric(r, "held_out_poses", name) for r in rows])
+    views = lambda name: describe([metric(r, "held_out_views", name) for r in rows])
     return {
-        "psnr_view_db": describe([metric(r, "held_out_views", "psnr_db") for r in rows]),
-        "psnr_pose_db": describe([metric(r, "held_out_poses", "psnr_db") for r in rows]),
+        "psnr_view_db": views("psnr_db"),
+        "psnr_pose_db": poses("psnr_db"),
         "psnr_pose_interleaved_db": describe(
             [metric(r, "held_out_poses_interleaved", "psnr_db") for r in rows]
         ),
         "psnr_pose_block_db": describe(
             [metric(r, "held_out_poses_block", "psnr_db") for r in rows]
         ),
-        "head_psnr_db": describe([metric(r, "held_out_poses", "head_psnr_db") for r in rows]),
-        "flat_psnr_db": describe([metric(r, "held_out_poses", "flat_psnr_db") for r in rows]),
+        "head_psnr_db": poses("head_psnr_db"),
+        "flat_psnr_db": poses("flat_psnr_db"),
         "above_flat_db": describe([above_flat_db(r) for r in rows]),
-        "highpass_ratio": describe([metric(r, "held_out_poses", "highpass_ratio") for r in rows]),
+        **{name: poses(name) for name in FIGURES},
+        **{"view_" + name: views(name) for name in FIGURES},
         "difference_psnr_db": describe([r["quality"]["difference_psnr_db"] for r in rows]),
     }
+
+
+# Figures whose means stand first in the file.
+MEANS = [
+    "psnr_view_db",
+    "psnr_pose_db",
+    "head_psnr_db",
+    "flat_psnr_db",
+    "above_flat_db",
+    "highpass_ratio",
+    "highpass_correlation",
+    "bust_head_psnr_db",
+]
+
+
+# The mean of a figure of all members; None where nobody has it.
+def mean_of(everybody, name):
+    return everybody[name]["mean"] if everybody[name] else None
 
 
 def frozen_gain(rows):
@@ -107,13 +140,29 @@ def rounding(rows):
 
 def shortened_spectrum(spectrum):
     """Takes the share of variance of every direction out of the spectrum and leaves what the first
-    1, 2, 4, ... hold together; returns the shares, a row a direction."""
-    columns = {token["name"]: token for token in spectrum["tokens"]} | {"whole": spectrum["whole"]}
+    1, 2, 4, ... hold together; returns the shares, a row a direction. Of a map's patches, of which
+    there are dozens, quantiles stay."""
+    patches = [token for token in spectrum["tokens"] if token["name"].startswith("static.")]
+    tokens = [token for token in spectrum["tokens"] if token not in patches]
+    columns = {token["name"]: token for token in tokens}
+    columns |= spectrum.get("by_kind", {}) | {"whole": spectrum["whole"]}
     shares = {name: part.pop("variance_share") for name, part in columns.items()}
     for name, part in columns.items():
         held = list(itertools.accumulate(shares[name]))
         ranks = [2**k for k in range(len(held).bit_length())]
         part["variance_of_first"] = {str(rank): held[rank - 1] for rank in ranks}
+    if patches:
+        spectrum["tokens"] = tokens
+        spectrum["patches"] = {
+            "count": len(patches),
+            "entries": results.quantiles([patch["entries"] for patch in patches]),
+            "directions_for_90": results.quantiles(
+                [patch["directions_for"]["90"] for patch in patches]
+            ),
+            "participation_ratio": results.quantiles(
+                [patch["participation_ratio"] for patch in patches]
+            ),
+        }
     directions = range(max(map(len, shares.values()), default=0))
     cell = lambda values, k: f"{values[k]:.3g}" if k < len(values) else None
     return [
@@ -143,10 +192,7 @@ def main():
     result = {
         "identities": len(parts["train"]),
         "held_out": len(parts["validation"]) + len(parts["test"]),
-        "psnr_view_db_mean": everybody["psnr_view_db"]["mean"],
-        "psnr_pose_db_mean": everybody["psnr_pose_db"]["mean"],
-        "head_psnr_db_mean": everybody["head_psnr_db"]["mean"],
-        "flat_psnr_db_mean": everybody["flat_psnr_db"]["mean"],
+        **{f"{name}_mean": mean_of(everybody, name) for name in MEANS},
         "gain_over_frozen_pose_db": gain["mean"] if gain else None,
         "seconds_per_avatar": statistics.fmean(r["train_seconds"] for r in rows) / CORES,
         "bytes": package.stat().st_size if package.exists() else None,

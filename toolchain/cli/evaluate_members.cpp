@@ -17,6 +17,7 @@
 #include "toolchain/members/member_sheets.h"
 #include "toolchain/members/members.h"
 #include "toolchain/model/threads.h"
+#include "toolchain/pictures/body_parts.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/population_file.h"
 #include "toolchain/train/run_directory.h"
@@ -28,7 +29,8 @@ namespace {
 constexpr size_t kMaxSheetBytes = 1'500'000;
 
 struct MembersArguments {
-  std::string population, body, motion, output, wall, interpolation, worst_sheet;
+  std::string population, body, motion, output;
+  std::string wall, bust_wall, interpolation, part_mixtures, worst_sheet;
   size_t worst = 10;
   members::MembersOptions options;
   uint32_t threads = 1;
@@ -74,6 +76,7 @@ void print_spectrum(const nlohmann::json& spectrum) {
   };
   std::printf("spectrum of the training members\n");
   print("whole", spectrum.at("whole"));
+  for (const auto& [kind, row] : spectrum.at("by_kind").items()) print(kind, row);
   for (const nlohmann::json& token : spectrum.at("tokens"))
     print(token.at("name").get<std::string>(), token);
 }
@@ -90,9 +93,27 @@ void print_span(const nlohmann::json& span) {
   };
   std::printf("held-out members replaced, against themselves\n");
   for (const auto& [key, row] : span.at("baselines").items()) print(key, row);
-  for (const char* basis : {"per_layer", "whole"}) {
-    for (const nlohmann::json& row : span.at(basis))
-      print(std::string(basis) + ", rank " + std::to_string(row.at("rank").get<int>()), row);
+  const auto print_ranks = [&](const std::string& name, const nlohmann::json& rows) {
+    for (const nlohmann::json& row : rows)
+      print(name + ", rank " + std::to_string(row.at("rank").get<int>()), row);
+  };
+  for (const char* basis : {"per_layer", "whole"}) print_ranks(basis, span.at(basis));
+  for (const auto& [kind, rows] : span.at("by_kind").items()) print_ranks(kind + " alone", rows);
+}
+
+void print_part_mixtures(const nlohmann::json& mixtures) {
+  if (mixtures.is_null()) return;
+  for (const nlohmann::json& pair : mixtures.at("pairs")) {
+    std::printf("%s with parts of %s (%s): high-pass energy over the mean of the two's\n",
+                pair.at("a").get<std::string>().c_str(), pair.at("b").get<std::string>().c_str(),
+                pair.at("why").get<std::string>().c_str());
+    for (const nlohmann::json& row : pair.at("rows")) {
+      const nlohmann::json& nearest = row.at("nearest").at("pictures");
+      std::printf("  %-10s %5.2f  foreground %5.2f  nearest in pictures %s\n",
+                  row.at("of").get<std::string>().c_str(), number(row.at("highpass_ratio")),
+                  number(row.at("foreground_ratio")),
+                  nearest.at("member").get<std::string>().c_str());
+    }
   }
 }
 
@@ -111,11 +132,14 @@ void print_members(const nlohmann::json& report) {
                 pair.at("why").get<std::string>().c_str(),
                 number(pair.at("middle_highpass_ratio")));
   }
+  print_part_mixtures(report.at("part_mixtures"));
 }
 
 void run_members(const MembersArguments& arguments) {
   check_name("--wall", arguments.wall);
+  check_name("--bust-wall", arguments.bust_wall);
   check_name("--interpolation", arguments.interpolation);
+  check_name("--part-mixtures", arguments.part_mixtures);
   check_name("--worst-sheet", arguments.worst_sheet);
   const train::PackageFile population = train::open_population(arguments.population);
   const train::PackageFile body = train::open_package(arguments.body, PackageKind::kBody);
@@ -125,6 +149,14 @@ void run_members(const MembersArguments& arguments) {
     throw_if_error(check_motion_fits_body(motion->package.motion(), body.package.body()),
                    arguments.motion);
   }
+  // What cannot be drawn is said before everybody is.
+  const std::string obstacle =
+      members::part_mixture_obstacle(population.package.population(), body.package.body());
+  if (!arguments.part_mixtures.empty() && !obstacle.empty())
+    throw InputError("--part-mixtures: " + obstacle);
+  if (!arguments.bust_wall.empty() && pictures::bust_texels(body.package.body()).empty())
+    throw InputError("--bust-wall: body '" + body.package.body().name +
+                     "': has no texel that a joint called head, neck or collar moves most");
   const members::MemberSet set(population.package, body.package,
                                {.motion = motion ? &motion->package.motion() : nullptr,
                                 .threads = arguments.threads,
@@ -137,13 +169,18 @@ void run_members(const MembersArguments& arguments) {
                         {"date", train::utc_now()},
                         {"package", arguments.population},
                         {"package_hash", format_hash(population.package.content_hash())}};
-  report.update(members::evaluate_members(set, distances, pairs, arguments.options));
+  std::optional<members::PartExchange> parts;
+  if (obstacle.empty()) parts.emplace(population.package.population(), body.package.body());
+  report.update(members::evaluate_members(set, distances, pairs, parts ? &*parts : nullptr,
+                                          arguments.options));
   // Pictures are drawn before anything is written: what is interrupted leaves nothing.
-  std::optional<ports::ImageU8> wall, strip, worst;
+  std::optional<ports::ImageU8> wall, busts, strip, exchanged, worst;
   const std::vector<size_t> worst_members =
       members::worst_members(population.package.population(), arguments.worst);
   if (!arguments.wall.empty()) wall = members::draw_wall(set);
+  if (!arguments.bust_wall.empty()) busts = members::draw_bust_wall(set);
   if (!arguments.interpolation.empty()) strip = members::draw_mixtures(set, pairs);
+  if (!arguments.part_mixtures.empty()) exchanged = members::draw_part_mixtures(set, *parts, pairs);
   if (!arguments.worst_sheet.empty()) {
     if (worst_members.empty())
       throw InputError(arguments.population +
@@ -151,7 +188,9 @@ void run_members(const MembersArguments& arguments) {
     worst = members::draw_close(set, worst_members);
   }
   if (wall) save_sheet(arguments.wall, *wall);
+  if (busts) save_sheet(arguments.bust_wall, *busts);
   if (strip) save_sheet(arguments.interpolation, *strip);
+  if (exchanged) save_sheet(arguments.part_mixtures, *exchanged);
   if (worst) save_sheet(arguments.worst_sheet, *worst);
   train::write_json(arguments.output, report);
   print_members(report);
@@ -170,8 +209,12 @@ void add_evaluate_members_command(CLI::App& evaluate) {
                       "Motion package whose poses are drawn (default: golden poses of members)");
   command->add_option("-o,--output", arguments->output, "Report to write, JSON")->required();
   command->add_option("--wall", arguments->wall, "Picture of all members to write, JPEG");
+  command->add_option("--bust-wall", arguments->bust_wall,
+                      "Picture of all members' heads and shoulders to write, JPEG");
   command->add_option("--interpolation", arguments->interpolation,
                       "Picture of mixtures of two members to write, JPEG");
+  command->add_option("--part-mixtures", arguments->part_mixtures,
+                      "Picture of members with a part of another to write (static values), JPEG");
   command
       ->add_option("--worst", arguments->worst,
                    "Members of --worst-sheet, by PSNR on held-out poses (default 10)")

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "figurine/check.h"
 #include "figurine/texel_grid.h"
@@ -55,7 +56,7 @@ WeightLayout::Patches cut_into_patches(const TexelGrid& grid, std::vector<std::s
 WeightLayout::WeightLayout(const Network& network, size_t shape_coefficients) {
   add_network(network);
   if (shape_coefficients > 0) add("shape", shape_coefficients);
-  network_size_ = size_;
+  end_network();
 }
 
 WeightLayout::WeightLayout(const Population& population, const Body& body)
@@ -63,7 +64,7 @@ WeightLayout::WeightLayout(const Population& population, const Body& body)
   if (own_network_) add_network(population.network);
   const size_t shape = population.shape.size() / population.size();
   if (shape > 0) add("shape", shape);
-  network_size_ = size_;
+  end_network();
   for (size_t g = 0; g < population.static_part.groups.size(); ++g) {
     const StaticGroup& group = population.static_part.groups[g];
     std::vector<std::string> names;
@@ -81,9 +82,10 @@ WeightLayout::WeightLayout(const Sampler& sampler) : own_network_(!sampler.share
       if (layer.op == LayerOp::kConv2d)
         add("layer." + std::to_string(tokens_.size()), sizes[tokens_.size()]);
     }
+    kernel_tokens_ = tokens_.size();
   }
   if (sampler.shape_count > 0) add("shape", sampler.shape_count);
-  network_size_ = size_;
+  end_network();
   for (size_t g = 0; g < sampler.static_groups.size(); ++g) {
     const SampledStaticGroup& group = sampler.static_groups[g];
     std::vector<std::string> names;
@@ -102,6 +104,12 @@ void WeightLayout::add_network(const Network& network) {
     if (layer.op == LayerOp::kConv2d)
       add("layer." + std::to_string(tokens_.size()), layer.weights.size() + layer.bias.size());
   }
+  kernel_tokens_ = tokens_.size();
+}
+
+void WeightLayout::end_network() {
+  network_size_ = size_;
+  map_begin_ = tokens_.size();
 }
 
 void WeightLayout::add_group(size_t group, uint32_t channels, Patches patches,
@@ -142,11 +150,17 @@ void WeightLayout::read(const Avatar& avatar, std::span<double> weights) const {
 }
 
 RowMatrix WeightLayout::read(const Population& population) const {
-  RowMatrix all(static_cast<Eigen::Index>(population.size()), static_cast<Eigen::Index>(size_));
+  std::vector<size_t> everybody(population.size());
+  std::iota(everybody.begin(), everybody.end(), size_t{0});
+  return read(population, everybody);
+}
+
+RowMatrix WeightLayout::read(const Population& population, std::span<const size_t> members) const {
+  RowMatrix rows(static_cast<Eigen::Index>(members.size()), static_cast<Eigen::Index>(size_));
   std::vector<float> storage(member_floats(population));
-  for (size_t m = 0; m < population.size(); ++m)
-    read(open_member(population, m, storage), {&all(Eigen::Index(m), 0), size_});
-  return all;
+  for (size_t i = 0; i < members.size(); ++i)
+    read(open_member(population, members[i], storage), {&rows(Eigen::Index(i), 0), size_});
+  return rows;
 }
 
 Avatar WeightLayout::with(const Avatar& avatar, std::span<const double> weights,
@@ -232,8 +246,9 @@ size_t Standardisation::varying() const {
   return sum;
 }
 
-RowMatrix Standardisation::standardise(const RowMatrix& weights) const {
-  return ((weights.rowwise() - mean_).array().rowwise() * factor_.array()).matrix();
+RowMatrix Standardisation::standardise(RowMatrix weights) const {
+  weights = ((weights.rowwise() - mean_).array().rowwise() * factor_.array()).matrix();
+  return weights;
 }
 
 RowVector Standardisation::restore(const RowVector& z) const {

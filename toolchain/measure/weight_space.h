@@ -58,6 +58,13 @@ class WeightLayout {
   size_t size() const { return size_; }                         // D
   // Values of convolutions and shape, which come first.
   size_t network_size() const { return network_size_; }
+  // Tokens [first, end) of a kind of weight; none of them: both alike. The shape's is of neither.
+  struct TokenRange {
+    size_t first = 0, end = 0;
+    bool empty() const { return first == end; }
+  };
+  TokenRange kernels() const { return {0, kernel_tokens_}; }  // convolutions, with their biases
+  TokenRange map() const { return {map_begin_, tokens_.size()}; }  // patches of the static part
   // Rows and cells of a static group's patches, as a sampler's package has them.
   struct Patches {
     std::vector<uint32_t> row, patch_rows;
@@ -66,8 +73,9 @@ class WeightLayout {
 
   // The avatar's values in the order of its tokens. weights: [D].
   void read(const Avatar& avatar, std::span<double> weights) const;
-  // All members of the population, opened one after the other: [M,D].
+  // All members of the population, opened one after the other: [M,D]; or the given ones.
   RowMatrix read(const Population& population) const;
+  RowMatrix read(const Population& population, std::span<const size_t> members) const;
   // The avatar with other values, rounded to float, and its static ones to integers with 127 levels
   // of either sign a channel, in the storage, which must outlive it; all else is the given
   // avatar's.
@@ -76,12 +84,13 @@ class WeightLayout {
  private:
   void add(const std::string& name, size_t size);
   void add_network(const Network& network);
+  void end_network();  // what is added from here on is the map's
   void add_group(size_t group, uint32_t channels, Patches patches,
                  const std::vector<std::string>& names);
 
   bool own_network_ = true;
   std::vector<Token> tokens_;
-  size_t size_ = 0, network_size_ = 0;
+  size_t size_ = 0, network_size_ = 0, kernel_tokens_ = 0, map_begin_ = 0;
   std::vector<Patches> patches_;
   // [values of the static part, group after group as an avatar has them] where each lies.
   std::vector<size_t> place_;
@@ -100,8 +109,9 @@ class Standardisation {
   size_t varying(size_t token) const { return varying_[token]; }
   size_t varying() const;  // of all tokens together
 
-  RowMatrix standardise(const RowMatrix& weights) const;  // [M,D] to [M,D]
-  RowVector restore(const RowVector& z) const;            // [D] to [D]
+  // [M,D] to [M,D]; in place if it is moved in, for a large population fills much of a memory.
+  RowMatrix standardise(RowMatrix weights) const;
+  RowVector restore(const RowVector& z) const;  // [D] to [D]
 
  private:
   std::vector<Token> tokens_;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "toolchain/error.h"
+#include "toolchain/pictures/body_parts.h"
 #include "toolchain/train/opened_member.h"
 
 namespace figurine::members {
@@ -14,6 +15,7 @@ using measure::Standardisation;
 using pictures::Extent;
 using pictures::Shot;
 using pictures::ShotRenderer;
+using pictures::Subject;
 using train::fixed_poses;
 using train::OpenedMember;
 
@@ -22,18 +24,20 @@ namespace {
 constexpr size_t kFewestTraining =
     3;  // two have one direction and one distance: nothing to say of a population
 constexpr float kPictureMargin = 0.04f, kPortraitMargin = 0.045f;
-constexpr uint32_t kSupersampling =
-    2;  // the splatter's 0.3 px^2 of blur are a quarter of that in a portrait
 constexpr float kNarrowest = 0.35f, kWidest = 0.9f;  // of a portrait, by its height
+constexpr float kNarrowestBust = 0.7f, kWidestBust = 1.1f;
+// Of all members, whose busts a cell holds: one with hair of a metre may not make everybody small.
+constexpr double kFramedBusts = 0.98;
 
-std::vector<Shot> make_shots() {
+std::vector<Shot> make_shots(const Body& body) {
   std::vector<Shot> shots;
   for (size_t pose = 0; pose < 2; ++pose) {
     for (const float azimuth_deg : {0.0f, 120.0f, 240.0f})
-      shots.push_back({pose, azimuth_deg, 5, false});
+      shots.push_back({pose, azimuth_deg, 5, Subject::kPlaced});
   }
-  shots.push_back({0, 20, 5, true});
-  shots.push_back({0, 200, 5, true});
+  shots.push_back({0, 20, 5, Subject::kGrounded});
+  shots.push_back({0, 200, 5, Subject::kGrounded});
+  if (!pictures::bust_texels(body).empty()) shots.push_back({0, 20, 5, Subject::kBust});
   return shots;
 }
 
@@ -43,13 +47,6 @@ std::vector<size_t> members_of(const Population& population, bool training) {
     if ((population.members[m].split == Split::kTrain) == training) members.push_back(m);
   }
   return members;
-}
-
-RowMatrix rows_of(const RowMatrix& all, const std::vector<size_t>& rows) {
-  RowMatrix chosen(static_cast<Eigen::Index>(rows.size()), all.cols());
-  for (size_t i = 0; i < rows.size(); ++i)
-    chosen.row(static_cast<Eigen::Index>(i)) = all.row(static_cast<Eigen::Index>(rows[i]));
-  return chosen;
 }
 
 // Everything that can be wrong with the two packages, before any work.
@@ -65,6 +62,25 @@ const Population& check(const Package& package, const Package& body) {
                      " are needed");
   }
   return population;
+}
+
+// What holds all of them, or on each side the given share.
+Extent hold(const std::vector<Extent>& extents, double share) {
+  const auto reach = [&](auto&& side, double part) {
+    std::vector<float> values;
+    for (const Extent& extent : extents) values.push_back(side(extent));
+    const auto rank = static_cast<ptrdiff_t>(std::lround(part * double(values.size() - 1)));
+    std::nth_element(values.begin(), values.begin() + rank, values.end());
+    return values[static_cast<size_t>(rank)];
+  };
+  return {reach([](const Extent& e) { return e.left; }, 1 - share),
+          reach([](const Extent& e) { return e.right; }, share),
+          reach([](const Extent& e) { return e.top; }, 1 - share),
+          reach([](const Extent& e) { return e.bottom; }, share)};
+}
+
+bool has_quality(const Population& population, const char* name) {
+  return std::ranges::find(population.quality_names, name) != population.quality_names.end();
 }
 
 // Means of blocks; premultiplied, so that nothing has to be weighted.
@@ -98,13 +114,14 @@ MemberSet::MemberSet(const Package& population_package, const Package& body_pack
       held_out(members_of(population_package.population(), false)),
       layout(population_package.population(), body_package.body()),
       standardisation([&] {
-        const RowMatrix weights = layout.read(population());
-        Standardisation made(rows_of(weights, training), layout.tokens());
-        training_z = made.standardise(rows_of(weights, training));
-        held_out_z = made.standardise(rows_of(weights, held_out));
+        training_z = layout.read(population(), training);
+        Standardisation made(training_z, layout.tokens());
+        training_z = made.standardise(std::move(training_z));
+        held_out_z = made.standardise(layout.read(population(), held_out));
         return made;
       }()),
-      renderer(body_package, fixed_poses(population(), options.motion, 2), make_shots()),
+      renderer(body_package, fixed_poses(population(), options.motion, 2),
+               make_shots(body_package.body())),
       picture_px(std::clamp(2 * population().texels_a_side(), 128u, 256u)),
       pictures(population().size()) {
   frame_shots();
@@ -117,27 +134,37 @@ void MemberSet::frame_shots() {
   crew.run("framing", population().size(),
            [&](size_t m) { extents[m] = renderer.look(OpenedMember(population(), m).avatar); });
   for (size_t shot = 0; shot < renderer.shots().size(); ++shot) {
-    Extent all;
-    for (const std::vector<Extent>& own : extents) all.add(own[shot]);
+    std::vector<Extent> seen;
+    for (const std::vector<Extent>& own : extents) seen.push_back(own[shot]);
+    const Extent all = hold(seen, shot == kBustPortrait ? kFramedBusts : 1);
     if (!(all.right > all.left && all.bottom > all.top))
       throw InputError("population '" + population().name + "': its members cannot be seen");
     if (shot < kComparedShots) {
       renderer.frame(shot, all, picture_px, picture_px, kPictureMargin);
     } else {
-      portrait_extent_.add(all);
+      portrait_extent(shot).add(all);
     }
   }
 }
 
+uint32_t MemberSet::portrait_width_px(size_t shot, uint32_t height_px) const {
+  const bool bust = shot == kBustPortrait;
+  const float aspect = std::clamp(portrait_extent(shot).aspect(),
+                                  bust ? kNarrowestBust : kNarrowest, bust ? kWidestBust : kWidest);
+  return static_cast<uint32_t>(std::lround(aspect * static_cast<float>(height_px)));
+}
+
 Picture MemberSet::portrait(const Avatar& avatar, size_t shot, uint32_t height_px) const {
-  const float aspect = std::clamp(portrait_extent_.aspect(), kNarrowest, kWidest);
   // Drawn at about the scale of the pictures that trained the presets, then shrunk: the splatter's
-  // blur of 0.3 px^2 belongs to that scale.
+  // blur of 0.3 px^2 belongs to that scale. Of busts only where cameras of busts trained them.
+  const bool trained = shot != kBustPortrait || has_quality(population(), "bust_psnr_db");
   const auto finer = std::max(
-      1u, static_cast<uint32_t>(std::lround(3.2 * population().texels_a_side() / height_px)));
-  const auto width_px = static_cast<uint32_t>(std::lround(aspect * static_cast<float>(height_px)));
+      1u, trained
+              ? static_cast<uint32_t>(std::lround(3.2 * population().texels_a_side() / height_px))
+              : 1u);
+  const uint32_t width_px = portrait_width_px(shot, height_px);
   ShotRenderer framed = renderer;
-  framed.frame(shot, portrait_extent_, finer * width_px, finer * height_px, kPortraitMargin);
+  framed.frame(shot, portrait_extent(shot), finer * width_px, finer * height_px, kPortraitMargin);
   return shrink(framed.draw(avatar, shot, shot + 1).front(), finer);
 }
 

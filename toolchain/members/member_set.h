@@ -19,9 +19,10 @@ struct MemberSetOptions {
 
 // The pictures that everything is compared by come first; portraits are for people to look at.
 inline constexpr size_t kComparedShots = 6;  // two poses from three sides
-inline constexpr size_t kPortraitShots =
-    2;  // grounded: from the front, slightly turned, and from behind
-inline constexpr size_t kFrontPortrait = kComparedShots, kBackPortrait = kComparedShots + 1;
+// Grounded: from the front, slightly turned, and from behind; head and shoulders from the front, on
+// bodies with a head.
+inline constexpr size_t kFrontPortrait = kComparedShots, kBackPortrait = kComparedShots + 1,
+                        kBustPortrait = kComparedShots + 2;
 
 struct MemberSet {
   // Both are borrowed. Throws InputError if the population does not fit the body or has fewer than
@@ -34,8 +35,11 @@ struct MemberSet {
   std::vector<measure::Picture> draw(const Avatar& avatar) const {
     return renderer.draw(avatar, 0, kComparedShots);
   }
-  // One person to look at, a cell of `height_px`; all cells of a height are of one width and scale.
+  bool has_busts() const { return renderer.shots().size() > kBustPortrait; }
+  // One person to look at, a cell of `height_px`; all cells of a height and of whole people, or of
+  // busts, are of one width and scale.
   measure::Picture portrait(const Avatar& avatar, size_t shot, uint32_t height_px) const;
+  uint32_t portrait_width_px(size_t shot, uint32_t height_px) const;
 
   const Package* package;
   const Package* body;
@@ -50,7 +54,13 @@ struct MemberSet {
 
  private:
   void frame_shots();
-  pictures::Extent portrait_extent_;
+  pictures::Extent& portrait_extent(size_t shot) {
+    return shot == kBustPortrait ? bust_extent_ : portrait_extent_;
+  }
+  const pictures::Extent& portrait_extent(size_t shot) const {
+    return shot == kBustPortrait ? bust_extent_ : portrait_extent_;
+  }
+  pictures::Extent portrait_extent_, bust_extent_;
 };
 
 }  // namespace figurine::members

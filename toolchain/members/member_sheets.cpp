@@ -65,10 +65,19 @@ std::vector<std::vector<size_t>> parts_of(const Population& population) {
 // Cell heights. Small networks were trained on small pictures: drawn much larger, their Gaussians
 // leave gaps.
 struct Heights {
-  uint32_t wall_px, mixture_px, close_px;
+  uint32_t wall_px, bust_px, mixture_px, close_px;
 };
 Heights heights_for(const Population& population) {
-  return population.texels_a_side() >= 64 ? Heights{256, 360, 420} : Heights{144, 176, 208};
+  return population.texels_a_side() >= 64 ? Heights{256, 176, 360, 420}
+                                          : Heights{144, 96, 176, 208};
+}
+
+// At most so high that everybody fits into a picture that people still open.
+uint32_t wall_height_px(const MemberSet& set, size_t shot, uint32_t wanted_px) {
+  constexpr double kWall_px2 = 16e6;
+  const double members = static_cast<double>(set.population().size()),
+               aspect = double(set.portrait_width_px(shot, wanted_px)) / wanted_px;
+  return std::min(wanted_px, static_cast<uint32_t>(std::sqrt(kWall_px2 / (members * aspect))));
 }
 
 uint32_t rows_for(size_t members, uint32_t columns) {
@@ -129,14 +138,12 @@ ports::ImageU8 tile(const std::vector<std::vector<Picture>>& rows) {
   return sheet;
 }
 
-}  // namespace
-
-ports::ImageU8 draw_wall(const MemberSet& set) {
+ports::ImageU8 draw_everybody(const MemberSet& set, const std::string& what, size_t shot,
+                              uint32_t height) {
   const Population& population = set.population();
-  const uint32_t height = heights_for(population).wall_px;
   std::vector<Picture> portraits(population.size());
-  set.crew.run("wall", population.size(), [&](size_t m) {
-    portraits[m] = set.portrait(OpenedMember(population, m).avatar, kFrontPortrait, height);
+  set.crew.run(what, population.size(), [&](size_t m) {
+    portraits[m] = set.portrait(OpenedMember(population, m).avatar, shot, height);
   });
   const uint32_t width = portraits[0].width_px;
   const std::vector<std::vector<size_t>> parts = parts_of(population);
@@ -163,6 +170,18 @@ ports::ImageU8 draw_wall(const MemberSet& set) {
   return wall;
 }
 
+}  // namespace
+
+ports::ImageU8 draw_wall(const MemberSet& set) {
+  return draw_everybody(set, "wall", kFrontPortrait,
+                        wall_height_px(set, kFrontPortrait, heights_for(set.population()).wall_px));
+}
+
+ports::ImageU8 draw_bust_wall(const MemberSet& set) {
+  return draw_everybody(set, "wall of busts", kBustPortrait,
+                        wall_height_px(set, kBustPortrait, heights_for(set.population()).bust_px));
+}
+
 ports::ImageU8 draw_mixtures(const MemberSet& set, const std::vector<MixedPair>& pairs) {
   constexpr size_t kSteps = std::size(kMixSteps);
   const uint32_t height = heights_for(set.population()).mixture_px;
@@ -176,6 +195,31 @@ ports::ImageU8 draw_mixtures(const MemberSet& set, const std::vector<MixedPair>&
                      kFrontPortrait, height);
   });
   return tile(rows);
+}
+
+ports::ImageU8 draw_part_mixtures(const MemberSet& set, const PartExchange& parts,
+                                  const std::vector<MixedPair>& pairs) {
+  constexpr size_t kColumns = std::size(kPartRows), kEnds = 2;
+  const uint32_t height = heights_for(set.population()).mixture_px;
+  std::vector<Picture> cells(pairs.size() * kColumns);
+  set.crew.run("parts", cells.size(), [&](size_t i) {
+    const MixedPair& pair = pairs[i / kColumns];
+    const OpenedMember a(set.population(), pair.a), b(set.population(), pair.b);
+    WeightStorage storage;
+    cells[i] = set.portrait(
+        part_row(set.layout, parts, a.avatar, b.avatar, kPartRows[i % kColumns], storage),
+        kFrontPortrait, height);
+  });
+  const uint32_t width = cells[0].width_px;
+  ports::ImageU8 sheet =
+      grey_image(kColumns * width + kSeparator_px, height * uint32_t(pairs.size()));
+  for (size_t i = 0; i < cells.size(); ++i) {
+    const auto column = static_cast<uint32_t>(i % kColumns);
+    paste(cells[i], sheet, column * width + (column < kEnds ? 0 : kSeparator_px),
+          uint32_t(i / kColumns) * height);
+  }
+  draw_line(sheet, {kEnds * width + kSeparator_px / 2, 0, 1, sheet.height_px});
+  return sheet;
 }
 
 ports::ImageU8 draw_close(const MemberSet& set, const std::vector<size_t>& members) {

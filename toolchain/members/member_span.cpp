@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "toolchain/json_number.h"
 #include "toolchain/measure/statistics.h"
@@ -13,11 +16,9 @@ namespace figurine::members {
 
 using measure::directions_for;
 using measure::foreground_error;
-using measure::high_pass;
 using measure::participation_ratio;
 using measure::Picture;
 using measure::PrincipalBasis;
-using measure::RowMatrix;
 using measure::RowVector;
 using measure::SquaredError;
 using measure::summarise;
@@ -47,8 +48,8 @@ nlohmann::json describe(const PrincipalBasis& basis, size_t entries) {
 // What one way of replacing held-out members loses: in weights, and in pictures against the
 // member's own.
 struct Replacement {
-  explicit Replacement(size_t held_out) : lost(held_out, 0), error(held_out) {}
-  std::vector<double> lost;         // [H] share of the squared distance to the training mean
+  explicit Replacement(size_t held_out) : lost(held_out), all(held_out), error(held_out) {}
+  std::vector<double> lost, all;    // [H] squared distance to it, and to the training mean
   std::vector<SquaredError> error;  // [H] foreground of the member's own pictures, all shots
 };
 
@@ -58,8 +59,7 @@ SquaredError error_to(const std::vector<Picture>& own, const std::vector<Picture
   return error;
 }
 
-nlohmann::json describe(const MemberSet& set, const Replacement& replacement,
-                        const std::vector<double>& energy) {
+nlohmann::json describe(const MemberSet& set, const Replacement& replacement) {
   SquaredError pooled;
   double lost = 0, all = 0, worst_db = std::numeric_limits<double>::infinity(), most_lost = 0;
   std::vector<double> each_db;
@@ -67,37 +67,41 @@ nlohmann::json describe(const MemberSet& set, const Replacement& replacement,
   for (size_t h = 0; h < set.held_out.size(); ++h) {
     pooled.add(replacement.error[h]);
     each_db.push_back(replacement.error[h].psnr_db());
-    lost += replacement.lost[h] * energy[h];
-    all += energy[h];
-    most_lost = std::max(most_lost, replacement.lost[h]);
+    lost += replacement.lost[h];
+    all += replacement.all[h];
+    most_lost = std::max(most_lost, replacement.lost[h] / replacement.all[h]);
     if (each_db.back() < worst_db) worst_db = each_db.back(), worst = h;
   }
-  return {{"variance_kept", 1 - lost / all},     {"worst_variance_kept", 1 - most_lost},
-          {"span_db", finite(pooled.psnr_db())}, {"mean_db", finite(summarise(each_db).mean)},
-          {"worst_db", finite(worst_db)},        {"worst_member", set.name(set.held_out[worst])}};
+  return {{"variance_kept", finite(1 - lost / all)},
+          {"worst_variance_kept", finite(1 - most_lost)},
+          {"span_db", finite(pooled.psnr_db())},
+          {"mean_db", finite(summarise(each_db).mean)},
+          {"worst_db", finite(worst_db)},
+          {"worst_member", set.name(set.held_out[worst])}};
 }
 
-// A rank's projection of a held-out member: by the tokens' bases, or by the last one alone.
+// A rank's projection of a held-out member: by the tokens' bases, or by the whole's alone.
 class Projector {
  public:
-  Projector(const std::vector<PrincipalBasis>& bases, const RowVector& z) : bases_(&bases), z_(z) {
-    for (const PrincipalBasis& basis : bases) coordinates_.push_back(basis.coordinates(z));
+  Projector(const MemberBases& bases, const RowVector& z)
+      : bases_(&bases), of_whole_(bases.whole.coordinates(z)) {
+    for (const PrincipalBasis& basis : bases.tokens) of_token_.push_back(basis.coordinates(z));
   }
   RowVector per_layer(size_t rank) const {
-    RowVector projected = RowVector::Zero(z_.size());
-    for (size_t t = 0; t + 1 < bases_->size(); ++t) {
-      const PrincipalBasis& basis = (*bases_)[t];
+    RowVector projected(static_cast<Eigen::Index>(bases_->whole.size()));
+    for (size_t t = 0; t < bases_->tokens.size(); ++t) {
+      const PrincipalBasis& basis = bases_->tokens[t];
       projected.segment(Eigen::Index(basis.begin()), Eigen::Index(basis.size())) =
-          basis.combine(coordinates_[t], rank);
+          basis.combine(of_token_[t], rank);
     }
     return projected;
   }
-  RowVector whole(size_t rank) const { return bases_->back().combine(coordinates_.back(), rank); }
+  RowVector whole(size_t rank) const { return bases_->whole.combine(of_whole_, rank); }
 
  private:
-  const std::vector<PrincipalBasis>* bases_;
-  RowVector z_;
-  std::vector<Eigen::VectorXd> coordinates_;
+  const MemberBases* bases_;
+  std::vector<Eigen::VectorXd> of_token_;
+  Eigen::VectorXd of_whole_;
 };
 
 std::vector<uint32_t> sound_ranks(std::vector<uint32_t> ranks, size_t members) {
@@ -111,32 +115,48 @@ std::vector<uint32_t> sound_ranks(std::vector<uint32_t> ranks, size_t members) {
 
 // Everything that is tried on held-out members.
 struct Replacements {
-  std::vector<Replacement> per_layer, whole;  // [ranks]
+  std::vector<Replacement> per_layer, whole;      // [ranks]
+  std::vector<std::vector<Replacement>> by_kind;  // [kinds][ranks]
   Replacement mean, nearest_weights, nearest_picture;
 };
 
-void replace_member(const MemberSet& set, const std::vector<PrincipalBasis>& bases,
+void replace_member(const MemberSet& set, const MemberBases& bases,
                     const std::vector<uint32_t>& ranks, size_t h, Replacements& out) {
   const OpenedMember opened(set.population(), set.held_out[h]);
   const std::vector<Picture>& own = set.pictures[set.held_out[h]];
   const RowVector z = set.held_out_z.row(Eigen::Index(h));
-  const double energy = z.squaredNorm();
+  RowVector own_weights(z.size());
+  set.layout.read(opened.avatar, {own_weights.data(), size_t(own_weights.size())});
   WeightStorage storage;
-  const auto try_weights = [&](const RowVector& instead, Replacement& replacement) {
-    const RowVector weights = set.standardisation.restore(instead);
-    replacement.lost[h] = (z - instead).squaredNorm() / energy;
+  // Instead of all values, or of a stretch of them: the others stay the member's own to the bit.
+  const auto try_stretch = [&](const RowVector& instead, Eigen::Index begin, Eigen::Index size,
+                               Replacement& replacement) {
+    RowVector weights = own_weights;
+    weights.segment(begin, size) = set.standardisation.restore(instead).segment(begin, size);
+    replacement.lost[h] = (z - instead).segment(begin, size).squaredNorm();
+    replacement.all[h] = z.segment(begin, size).squaredNorm();
     replacement.error[h] =
         error_to(own, set.draw(set.layout.with(opened.avatar,
                                                {weights.data(), size_t(weights.size())}, storage)));
   };
+  const auto try_weights = [&](const RowVector& instead, Replacement& replacement) {
+    try_stretch(instead, 0, instead.size(), replacement);
+  };
   const Projector projector(bases, z);
   for (size_t i = 0; i < ranks.size(); ++i) {
-    try_weights(projector.per_layer(ranks[i]), out.per_layer[i]);
+    const RowVector per_layer = projector.per_layer(ranks[i]);
+    try_weights(per_layer, out.per_layer[i]);
     try_weights(projector.whole(ranks[i]), out.whole[i]);
+    for (size_t k = 0; k < bases.kinds.size(); ++k) {
+      const PrincipalBasis& basis = bases.kinds[k].basis;
+      try_stretch(per_layer, Eigen::Index(basis.begin()), Eigen::Index(basis.size()),
+                  out.by_kind[k][i]);
+    }
   }
   try_weights(RowVector::Zero(z.size()), out.mean);
   const auto try_member = [&](size_t n, Replacement& replacement) {
-    replacement.lost[h] = (z - set.training_z.row(Eigen::Index(n))).squaredNorm() / energy;
+    replacement.lost[h] = (z - set.training_z.row(Eigen::Index(n))).squaredNorm();
+    replacement.all[h] = z.squaredNorm();
     replacement.error[h] = error_to(own, set.pictures[set.training[n]]);
   };
   Eigen::Index nearest = 0;
@@ -149,147 +169,99 @@ void replace_member(const MemberSet& set, const std::vector<PrincipalBasis>& bas
              out.nearest_picture);
 }
 
-double high_pass_energy(const std::vector<Picture>& pictures) {
-  double energy = 0;
-  for (const Picture& picture : pictures) energy += high_pass(picture, picture).truth;
-  return energy;
+size_t varying(const MemberSet& set, const WeightLayout::TokenRange& tokens) {
+  size_t sum = 0;
+  for (size_t t = tokens.first; t < tokens.end; ++t) sum += set.standardisation.varying(t);
+  return sum;
 }
 
-double foreground_pixels(const std::vector<Picture>& pictures) {
-  uint64_t values = 0;
-  for (const Picture& picture : pictures) values += foreground_error(picture, picture).count;
-  return static_cast<double>(values) / 3;
-}
-
-// The training members nearest to given standardised weights and pictures.
-nlohmann::json nearest_to(const MemberSet& set, const RowVector& z,
-                          const std::vector<Picture>& pictures) {
-  Eigen::Index row = 0;
-  const double squares = (set.training_z.rowwise() - z).rowwise().squaredNorm().minCoeff(&row);
-  double best_db = -std::numeric_limits<double>::infinity();
-  size_t best = 0;
-  for (const size_t member : set.training) {
-    const double psnr_db = union_error(pictures, set.pictures[member]).psnr_db();
-    if (psnr_db > best_db) best_db = psnr_db, best = member;
+nlohmann::json describe_ranks(const MemberSet& set, const std::vector<uint32_t>& ranks,
+                              const std::vector<Replacement>& tried) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (size_t i = 0; i < ranks.size(); ++i) {
+    nlohmann::json row{{"rank", ranks[i]}};
+    row.update(describe(set, tried[i]));
+    rows.push_back(std::move(row));
   }
-  const double rms = std::sqrt(squares / static_cast<double>(set.standardisation.varying()));
-  return {{"weights", {{"member", set.name(set.training[size_t(row)])}, {"rms", rms}}},
-          {"pictures", {{"member", set.name(best)}, {"psnr_db", finite(best_db)}}}};
-}
-
-struct Mixture {
-  double energy = 0, foreground = 0;
-  nlohmann::json nearest;
-};
-
-Mixture measure_mixture(const MemberSet& set, const MixedPair& pair, double share) {
-  const OpenedMember a(set.population(), pair.a), b(set.population(), pair.b);
-  WeightStorage storage;
-  const Avatar mixed = mix(set.layout, a.avatar, b.avatar, share, storage);
-  RowMatrix weights(1, set.training_z.cols());
-  set.layout.read(mixed, {weights.data(), size_t(weights.size())});
-  const std::vector<Picture> pictures = set.draw(mixed);
-  return {high_pass_energy(pictures), foreground_pixels(pictures),
-          nearest_to(set, set.standardisation.standardise(weights).row(0), pictures)};
+  return rows;
 }
 
 }  // namespace
 
-std::vector<PrincipalBasis> make_bases(const MemberSet& set) {
+MemberBases make_bases(const MemberSet& set) {
   const std::vector<Token>& tokens = set.standardisation.tokens();
-  std::vector<PrincipalBasis> bases;
-  for (const Token& token : tokens) bases.emplace_back(set.training_z, token.begin, token.size);
-  bases.emplace_back(set.training_z, 0, size_t(set.training_z.cols()));
+  struct Stretch {
+    size_t begin, size;
+  };
+  std::vector<Stretch> stretches;  // of the tokens, of the kinds, of all
+  for (const Token& token : tokens) stretches.push_back({token.begin, token.size});
+  std::vector<std::pair<std::string, WeightLayout::TokenRange>> kinds;
+  for (const auto& [name, range] :
+       {std::pair{"kernels", set.layout.kernels()}, std::pair{"map", set.layout.map()}}) {
+    if (range.empty()) continue;
+    const Token& last = tokens[range.end - 1];
+    const size_t begin = tokens[range.first].begin;
+    stretches.push_back({begin, last.begin + last.size - begin});
+    kinds.emplace_back(name, range);
+  }
+  stretches.push_back({0, size_t(set.training_z.cols())});
+  std::vector<std::optional<PrincipalBasis>> found(stretches.size());
+  set.crew.run("principal directions", stretches.size(), [&](size_t i) {
+    found[i].emplace(set.training_z, stretches[i].begin, stretches[i].size);
+  });
+  MemberBases bases{{}, {}, std::move(*found.back())};
+  for (size_t t = 0; t < tokens.size(); ++t) bases.tokens.push_back(std::move(*found[t]));
+  for (size_t k = 0; k < kinds.size(); ++k) {
+    bases.kinds.push_back({kinds[k].first, kinds[k].second, std::move(*found[tokens.size() + k])});
+  }
   return bases;
 }
 
-nlohmann::json describe_spectrum(const MemberSet& set, const std::vector<PrincipalBasis>& bases) {
-  nlohmann::json tokens = nlohmann::json::array();
-  for (size_t t = 0; t + 1 < bases.size(); ++t) {
+nlohmann::json describe_spectrum(const MemberSet& set, const MemberBases& bases) {
+  nlohmann::json tokens = nlohmann::json::array(), by_kind = nlohmann::json::object();
+  for (size_t t = 0; t < bases.tokens.size(); ++t) {
     nlohmann::json token{{"name", set.standardisation.tokens()[t].name},
                          {"scale", set.standardisation.scale(t)}};
-    token.update(describe(bases[t], set.standardisation.varying(t)));
+    token.update(describe(bases.tokens[t], set.standardisation.varying(t)));
     tokens.push_back(std::move(token));
   }
-  return {{"whole", describe(bases.back(), set.standardisation.varying())}, {"tokens", tokens}};
+  for (const MemberBases::Kind& kind : bases.kinds) {
+    by_kind[kind.name] = describe(kind.basis, varying(set, kind.tokens));
+    by_kind[kind.name]["share_of_whole"] =
+        finite(kind.basis.variance().sum() / bases.whole.variance().sum());
+  }
+  return {{"whole", describe(bases.whole, set.standardisation.varying())},
+          {"by_kind", by_kind},
+          {"tokens", tokens}};
 }
 
-nlohmann::json measure_span(const MemberSet& set, const std::vector<PrincipalBasis>& bases,
+nlohmann::json measure_span(const MemberSet& set, const MemberBases& bases,
                             std::vector<uint32_t> ranks) {
   const size_t held_out = set.held_out.size();
   if (held_out == 0) return nullptr;
   ranks = sound_ranks(std::move(ranks), set.training.size());
   const Replacement none(held_out);
-  Replacements tried{{ranks.size(), none}, {ranks.size(), none}, none, none, none};
+  const std::vector<Replacement> of_ranks(ranks.size(), none);
+  Replacements tried{.per_layer = of_ranks,
+                     .whole = of_ranks,
+                     .by_kind = std::vector(bases.kinds.size(), of_ranks),
+                     .mean = none,
+                     .nearest_weights = none,
+                     .nearest_picture = none};
   set.crew.run("projecting held-out members", held_out,
                [&](size_t h) { replace_member(set, bases, ranks, h, tried); });
-  std::vector<double> energy;
-  for (size_t h = 0; h < held_out; ++h)
-    energy.push_back(set.held_out_z.row(Eigen::Index(h)).squaredNorm());
-  nlohmann::json span{{"ranks", ranks}, {"held_out", held_out}};
-  for (const auto& [name, list] :
-       {std::pair{"per_layer", &tried.per_layer}, std::pair{"whole", &tried.whole}}) {
-    for (size_t i = 0; i < ranks.size(); ++i) {
-      nlohmann::json row{{"rank", ranks[i]}};
-      row.update(describe(set, (*list)[i], energy));
-      span[name].push_back(std::move(row));
-    }
-  }
-  span["baselines"] = {{"training_mean", describe(set, tried.mean, energy)},
-                       {"nearest_in_weights", describe(set, tried.nearest_weights, energy)},
-                       {"nearest_in_pictures", describe(set, tried.nearest_picture, energy)}};
+  nlohmann::json span{{"ranks", ranks},
+                      {"held_out", held_out},
+                      {"per_layer", describe_ranks(set, ranks, tried.per_layer)},
+                      {"whole", describe_ranks(set, ranks, tried.whole)},
+                      {"by_kind", nlohmann::json::object()},
+                      {"baselines",
+                       {{"training_mean", describe(set, tried.mean)},
+                        {"nearest_in_weights", describe(set, tried.nearest_weights)},
+                        {"nearest_in_pictures", describe(set, tried.nearest_picture)}}}};
+  for (size_t k = 0; k < bases.kinds.size(); ++k)
+    span["by_kind"][bases.kinds[k].name] = describe_ranks(set, ranks, tried.by_kind[k]);
   return span;
-}
-
-Avatar mix(const WeightLayout& layout, const Avatar& a, const Avatar& b, double share,
-           WeightStorage& storage) {
-  const auto between = [&](float x, float y) {
-    return static_cast<float>((1 - share) * x + share * y);
-  };
-  const size_t size = layout.size();
-  std::vector<double> first(size), second(size);
-  layout.read(a, first);
-  layout.read(b, second);
-  for (size_t i = 0; i < size; ++i) first[i] = (1 - share) * first[i] + share * second[i];
-  Avatar mixed = layout.with(a, first, storage);
-  for (size_t c = 0; c < kMapChannels; ++c) {
-    mixed.map_statistics.mean[c] = between(a.map_statistics.mean[c], b.map_statistics.mean[c]);
-    mixed.map_statistics.scale[c] = between(a.map_statistics.scale[c], b.map_statistics.scale[c]);
-  }
-  mixed.decoding.offset_scale_m = between(a.decoding.offset_scale_m, b.decoding.offset_scale_m);
-  mixed.decoding.spacing_scale = between(a.decoding.spacing_scale, b.decoding.spacing_scale);
-  mixed.decoding.max_log_scale = between(a.decoding.max_log_scale, b.decoding.max_log_scale);
-  // Never less room than either end has; 0 is no bound.
-  mixed.decoding.max_offset = a.decoding.max_offset == 0 || b.decoding.max_offset == 0
-                                  ? 0
-                                  : std::max(a.decoding.max_offset, b.decoding.max_offset);
-  mixed.decoding.opacity_bias = between(a.decoding.opacity_bias, b.decoding.opacity_bias);
-  return mixed;
-}
-
-nlohmann::json measure_interpolation(const MemberSet& set, const std::vector<MixedPair>& pairs) {
-  constexpr size_t kSteps = std::size(kMixSteps);
-  std::vector<Mixture> mixtures(pairs.size() * kSteps);
-  set.crew.run("mixing members", mixtures.size(), [&](size_t i) {
-    mixtures[i] = measure_mixture(set, pairs[i / kSteps], kMixSteps[i % kSteps]);
-  });
-  nlohmann::json report{{"steps", kMixSteps}, {"pairs", nlohmann::json::array()}};
-  for (size_t p = 0; p < pairs.size(); ++p) {
-    const Mixture *own = &mixtures[p * kSteps], &first = own[0], &last = own[kSteps - 1];
-    nlohmann::json row{
-        {"a", set.name(pairs[p].a)}, {"b", set.name(pairs[p].b)}, {"why", pairs[p].why}};
-    for (size_t i = 0; i < kSteps; ++i) {
-      row["steps"].push_back(
-          {{"share", kMixSteps[i]},
-           {"highpass_ratio", finite(2 * own[i].energy / (first.energy + last.energy))},
-           {"foreground_ratio",
-            finite(2 * own[i].foreground / (first.foreground + last.foreground))},
-           {"nearest", own[i].nearest}});
-    }
-    row["middle_highpass_ratio"] = row["steps"][kSteps / 2]["highpass_ratio"];
-    report["pairs"].push_back(std::move(row));
-  }
-  return report;
 }
 
 }  // namespace figurine::members

@@ -15,7 +15,6 @@ namespace figurine::members {
 using measure::ComparedPictures;
 using measure::histogram;
 using measure::pearson_correlation;
-using measure::PrincipalBasis;
 using measure::quantile;
 using measure::rms_distances;
 using measure::RowMatrix;
@@ -275,7 +274,7 @@ std::vector<MixedPair> choose_pairs(const MemberDistances& distances) {
 }
 
 nlohmann::json evaluate_members(const MemberSet& set, const MemberDistances& distances,
-                                const std::vector<MixedPair>& pairs,
+                                const std::vector<MixedPair>& pairs, const PartExchange* parts,
                                 const MembersOptions& options) {
   const Population& population = set.population();
   nlohmann::json counts;
@@ -284,7 +283,7 @@ nlohmann::json evaluate_members(const MemberSet& set, const MemberDistances& dis
         std::count_if(population.members.begin(), population.members.end(),
                       [&](const auto& member) { return member.split == split; });
   }
-  const std::vector<PrincipalBasis> bases = make_bases(set);
+  const MemberBases bases = make_bases(set);
   nlohmann::json report{
       {"name", population.name},
       {"preset", population.preset},
@@ -295,7 +294,9 @@ nlohmann::json evaluate_members(const MemberSet& set, const MemberDistances& dis
       {"distances", describe_distances(set, distances)},
       {"spectrum", describe_spectrum(set, bases)},
       {"span", measure_span(set, bases, options.ranks)},
-      {"interpolation", measure_interpolation(set, pairs)}};
+      {"interpolation", measure_interpolation(set, pairs)},
+      {"part_mixtures", nullptr}};
+  if (parts != nullptr) report["part_mixtures"] = measure_part_mixtures(set, *parts, pairs);
   report["span_db"] = nullptr;
   if (!report["span"].is_null()) {
     for (const nlohmann::json& row : report["span"]["per_layer"])

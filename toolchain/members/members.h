@@ -1,6 +1,7 @@
 // What a population is like, from its package alone: quality, distances between members, the
-// spectrum of their weights, how well the training members span the held-out ones, and what lies
-// between two of them. docs/json.md describes the report, docs/numerics.md the quantities.
+// spectrum of their weights, how well the training members span the held-out ones, what lies
+// between two of them, and what the parts of two are together. docs/json.md describes the report,
+// docs/numerics.md the quantities.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +11,8 @@
 
 #include "toolchain/members/member_set.h"
 #include "toolchain/members/member_span.h"
+#include "toolchain/members/mixtures.h"
+#include "toolchain/members/part_mixtures.h"
 
 namespace figurine::members {
 
@@ -38,8 +41,10 @@ struct MembersOptions {
   std::vector<uint32_t> ranks{1, 2, 4, 8, 16, 32, 64, 128, 256, 512};
 };
 // The whole report but for where it came from. "span_db" repeats span.per_layer by rank:
-// {"8": 21.5, ...}; null without held-out members.
+// {"8": 21.5, ...}; null without held-out members. parts: null where members cannot be mixed by
+// part; then "part_mixtures" is null.
 nlohmann::json evaluate_members(const MemberSet& set, const MemberDistances& distances,
-                                const std::vector<MixedPair>& pairs, const MembersOptions& options);
+                                const std::vector<MixedPair>& pairs, const PartExchange* parts,
+                                const MembersOptions& options);
 
 }  // namespace figurine::members

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "toolchain/pictures/body_parts.h"
+
 namespace figurine::pictures {
 
 using measure::Box;
@@ -17,12 +19,6 @@ namespace {
 constexpr std::array<uint8_t, 4> kHeadJoints{15, 22, 23, 24};
 constexpr std::array<uint8_t, 16> kLeftHandJoints{20, 25, 26, 27, 28, 29, 30, 31,
                                                   32, 33, 34, 35, 36, 37, 38, 39};
-
-uint8_t strongest_joint(const Body& body, uint32_t texel) {
-  const float* weights = &body.texel_weights[size_t(texel) * kSkinInfluences];
-  return body.texel_joints[size_t(texel) * kSkinInfluences +
-                           (std::max_element(weights, weights + kSkinInfluences) - weights)];
-}
 
 }  // namespace
 

@@ -5,8 +5,10 @@
 #include <exception>
 #include <mutex>
 
+#include "figurine/check.h"
 #include "toolchain/error.h"
 #include "toolchain/model/parallel.h"
+#include "toolchain/pictures/body_parts.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/verify/device_avatar.h"
 
@@ -29,6 +31,14 @@ float quantile_of(std::vector<float>& values, double share) {
   return values[static_cast<size_t>(rank)];
 }
 
+// The middle of a coordinate's range (0, 1 or 2) but for what lies farthest out.
+float middle_m(std::span<const float> centres_m, size_t coordinate) {
+  std::vector<float> values;
+  for (size_t i = coordinate; i < centres_m.size(); i += 3) values.push_back(centres_m[i]);
+  const float low = quantile_of(values, kOutside);
+  return 0.5f * (low + quantile_of(values, 1 - kOutside));
+}
+
 // What lifts the person onto the ground y = 0.
 float height_above_ground_m(std::span<const float> centres_m) {
   std::vector<float> heights;
@@ -36,26 +46,51 @@ float height_above_ground_m(std::span<const float> centres_m) {
   return quantile_of(heights, kOutside);
 }
 
+constexpr std::array<float, 3> kBustPlace_m{0, 1.5f, 0};  // where every bust is moved to
+
+// Where a joint's +z axis points on the ground, as an azimuth.
+float heading_deg(const Body& body, const train::OwnedPose& pose, int joint) {
+  std::array<float, 3> forward{0, 0, 1};
+  for (; joint >= 0; joint = body.parents[static_cast<size_t>(joint)]) {
+    const std::array<float, 9> r =
+        rotation_from_quaternion(&pose.rotations[static_cast<size_t>(joint) * 4]);
+    forward = {r[0] * forward[0] + r[1] * forward[1] + r[2] * forward[2],
+               r[3] * forward[0] + r[4] * forward[1] + r[5] * forward[2],
+               r[6] * forward[0] + r[7] * forward[1] + r[8] * forward[2]};
+  }
+  return std::atan2(forward[0], forward[2]) * kDegrees;
+}
+
 // The shot's camera before it is framed: focal length 1, principal point 0, so that its pixels are
 // tangents.
 Camera unframed_camera(const Shot& shot, const train::OwnedPose& pose, const Body& body) {
-  const std::array<float, 9> root = rotation_from_quaternion(pose.rotations.data());
-  const float heading_deg =
-      std::atan2(root[2], root[8]) * kDegrees;  // the root's +z axis on the ground
-  const OrbitCamera orbit{.azimuth_deg = heading_deg + shot.azimuth_deg,
-                          .elevation_deg = shot.elevation_deg,
-                          .distance_m = kDistance_m,
-                          .target_m = root_position(body.mean_skeleton(), pose.view())};
+  const bool bust = shot.subject == Subject::kBust;
+  const auto head = std::ranges::find(body.joint_names, "head") - body.joint_names.begin();
+  const OrbitCamera orbit{
+      .azimuth_deg = heading_deg(body, pose, bust ? static_cast<int>(head) : 0) + shot.azimuth_deg,
+      .elevation_deg = shot.elevation_deg,
+      .distance_m = kDistance_m,
+      .target_m = bust ? kBustPlace_m : root_position(body.mean_skeleton(), pose.view())};
   Camera camera = value_or_throw(make_orbit_camera(orbit, 2, 2), "camera");
   camera.fx_px = camera.fy_px = 1;
   camera.cx_px = camera.cy_px = 0;
   return camera;
 }
 
-Extent extent_of(const Camera& camera, std::span<const float> centres_m, float up_m) {
+std::vector<float> rows_of(std::span<const float> centres_m, std::span<const uint32_t> texels) {
+  std::vector<float> rows;
+  for (const uint32_t texel : texels) {
+    for (size_t k = 0; k < 3; ++k) rows.push_back(centres_m[size_t{3} * texel + k]);
+  }
+  return rows;
+}
+
+Extent extent_of(const Camera& camera, std::span<const float> centres_m,
+                 const std::array<float, 3>& displacement_m) {
   std::vector<float> x, y;
   for (size_t i = 0; i + 2 < centres_m.size(); i += 3) {
-    const float world[3] = {centres_m[i], centres_m[i + 1] + up_m, centres_m[i + 2]};
+    const float world[3] = {centres_m[i] + displacement_m[0], centres_m[i + 1] + displacement_m[1],
+                            centres_m[i + 2] + displacement_m[2]};
     const std::array<float, 3> view = transform_point({camera.view_from_world}, world);
     if (!(view[2] > camera.near_m)) continue;
     x.push_back(view[0] / view[2]);
@@ -75,27 +110,46 @@ void Extent::add(const Extent& other) {
 
 ShotRenderer::ShotRenderer(const Package& body, std::vector<train::OwnedPose> poses,
                            std::vector<Shot> shots)
-    : body_(&body), poses_(std::move(poses)), shots_(std::move(shots)) {
+    : body_(&body),
+      bust_(bust_texels(body.body())),
+      poses_(std::move(poses)),
+      shots_(std::move(shots)) {
+  const bool busts = std::ranges::find(shots_, Subject::kBust, &Shot::subject) != shots_.end();
+  FIG_CHECK(!busts || !bust_.empty(), "a body with a head");
   for (const Shot& shot : shots_)
     cameras_.push_back(unframed_camera(shot, poses_[shot.pose], body.body()));
 }
 
-// visit(shot, posed avatar, how far up it is moved); the network runs where the pose changes.
+std::array<float, 3> ShotRenderer::displacement_m(const Shot& shot,
+                                                  std::span<const float> centres_m) const {
+  if (shot.subject == Subject::kPlaced) return {0, 0, 0};
+  if (shot.subject == Subject::kGrounded) return {0, -height_above_ground_m(centres_m), 0};
+  const std::vector<float> bust = rows_of(centres_m, bust_);
+  std::array<float, 3> moved = kBustPlace_m;
+  for (size_t k = 0; k < 3; ++k) moved[k] -= middle_m(bust, k);
+  return moved;
+}
+
+// visit(shot, posed avatar, how far it is moved); the network runs where the pose changes.
 template <class Visit>
 void ShotRenderer::each_shot(const Avatar& avatar, size_t first, size_t end, Visit&& visit) const {
   verify::DeviceAvatar device(avatar, *body_);
   for (size_t i = first; i < end; ++i) {
     if (i == first || shots_[i].pose != shots_[i - 1].pose)
       device.pose(poses_[shots_[i].pose].view());
-    visit(i, device, shots_[i].grounded ? -height_above_ground_m(device.centres_m()) : 0.0f);
+    visit(i, device, displacement_m(shots_[i], device.centres_m()));
   }
 }
 
 std::vector<Extent> ShotRenderer::look(const Avatar& avatar) const {
   std::vector<Extent> extents(shots_.size());
-  each_shot(avatar, 0, shots_.size(), [&](size_t shot, verify::DeviceAvatar& device, float up_m) {
-    extents[shot] = extent_of(cameras_[shot], device.centres_m(), up_m);
-  });
+  each_shot(avatar, 0, shots_.size(),
+            [&](size_t shot, verify::DeviceAvatar& device, const std::array<float, 3>& moved_m) {
+              const std::span<const float> centres_m = device.centres_m();
+              extents[shot] = shots_[shot].subject == Subject::kBust
+                                  ? extent_of(cameras_[shot], rows_of(centres_m, bust_), moved_m)
+                                  : extent_of(cameras_[shot], centres_m, moved_m);
+            });
   return extents;
 }
 
@@ -115,9 +169,10 @@ void ShotRenderer::frame(size_t shot, const Extent& extent, uint32_t width_px, u
 
 std::vector<Picture> ShotRenderer::draw(const Avatar& avatar, size_t first, size_t end) const {
   std::vector<Picture> pictures;
-  each_shot(avatar, first, end, [&](size_t shot, verify::DeviceAvatar& device, float up_m) {
-    pictures.push_back(device.draw(cameras_[shot], {0, up_m, 0}));
-  });
+  each_shot(avatar, first, end,
+            [&](size_t shot, verify::DeviceAvatar& device, const std::array<float, 3>& moved_m) {
+              pictures.push_back(device.draw(cameras_[shot], moved_m));
+            });
   return pictures;
 }
 

@@ -21,13 +21,18 @@ class DeviceAvatar;
 
 namespace figurine::pictures {
 
-// From where a pose is looked at. Azimuth 0 sees the person's front, positive angles move the
-// camera to its left.
+// What a shot shows of everybody: the person where the pose puts it, the person moved up or down
+// until it stands on the same ground, or its head and shoulders, moved until they are in the middle
+// (bodies with a joint called "head").
+enum class Subject : uint8_t { kPlaced, kGrounded, kBust };
+
+// From where a pose is looked at. Azimuth 0 sees the person's front, of a bust the face's; positive
+// angles move the camera to its left.
 struct Shot {
   size_t pose = 0;
   float azimuth_deg = 0;
   float elevation_deg = 5;
-  bool grounded = false;  // every person is moved up or down until it stands on the same ground
+  Subject subject = Subject::kPlaced;
 };
 
 // What a person takes up of a shot: tangents x/z and y/z of the camera's axes.
@@ -46,8 +51,8 @@ class ShotRenderer {
   const Camera& camera(size_t shot) const {
     return cameras_[shot];
   }  // of no size before it is framed
-  // Where the avatar appears in every shot but for the 0.2 % of its Gaussians that lie farthest out
-  // on each side.
+  // Where the avatar, or its bust, appears in every shot but for the 0.2 % of its Gaussians that
+  // lie farthest out on each side.
   std::vector<Extent> look(const Avatar& avatar) const;
   // The shot's camera: the largest scale at which the extent fits into the picture but for a margin
   // of its sides.
@@ -60,7 +65,10 @@ class ShotRenderer {
   template <class Visit>
   void each_shot(const Avatar& avatar, size_t first, size_t end, Visit&& visit) const;
 
+  std::array<float, 3> displacement_m(const Shot& shot, std::span<const float> centres_m) const;
+
   const Package* body_;
+  std::vector<uint32_t> bust_;  // texels
   std::vector<train::OwnedPose> poses_;
   std::vector<Shot> shots_;
   std::vector<Camera> cameras_;  // [shots]

@@ -12,6 +12,7 @@
 #include "ports/host/folder_lock.h"
 #include "ports/host/process.h"
 #include "ports/motion/clip.h"
+#include "ports/motion/import.h"
 #include "toolchain/body/atlas.h"
 #include "toolchain/body/makehuman_model.h"
 #include "toolchain/body/mannequin.h"
@@ -80,7 +81,8 @@ void make_body(const Recipe& recipe, const BuildOptions& options, const State& s
         model.surface, {.weight = *recipe.atlas_weight, .uv_size = uv_size, .coarsest_grid = grid});
     command += describe_atlas(*recipe.atlas_weight);
   }
-  const body::TexelBody texels = body::make_texel_body(model, uv_size);
+  body::TexelBody texels = body::make_texel_body(model, uv_size);
+  texels.states_mesh_places = recipe.atlas_weight.has_value();  // captures look for them there
   Provenance provenance = model.provenance;
   provenance.tool = "figurine-train " FIGURINE_VERSION;
   provenance.settings.insert(provenance.settings.begin(), {"command", command});
@@ -95,17 +97,27 @@ struct Motions {
   std::vector<std::string> sources;
 };
 
+// Every clip with the line that the motion commands print of it: a wrong axis or rate is seen
+// before anybody is photographed. What cannot be a person is an error.
 Motions read_motions(const Recipe& recipe, const std::string& recipe_path, const Body& body) {
   Motions motions;
   for (const MotionPiece& piece : recipe.motions) {
     const std::string path = find_clip(piece.clip, recipe_path);
-    if (fs::path(path).extension() == ".fgn" && (piece.start || piece.frames)) {
+    if (fs::path(path).extension() == ".fgn" &&
+        (piece.start || piece.frames || !piece.neutral.empty())) {
       throw InputError(recipe_path + ": motions: " + piece.clip +
-                       ": start and frames are for clips, this is a motion package");
+                       ": start, frames and neutral are for clips, this is a motion package");
     }
     ports::RetargetOptions retarget;
     retarget.name = piece.name, retarget.start = piece.start, retarget.frames = piece.frames;
-    motions.clips.push_back(value_or_throw(ports::read_clip(path, body, retarget)));
+    if (!piece.neutral.empty())
+      throw_if_error(ports::set_neutral(piece.neutral, retarget), recipe_path + ": motions");
+    ports::RetargetReport report;
+    motions.clips.push_back(value_or_throw(ports::read_clip(path, body, retarget, &report)));
+    if (!report.summary.empty()) {
+      ports::sayf("motion %s: %s", piece.name.c_str(),
+                  ports::describe_motion(report, motions.clips.back()).c_str());
+    }
     const std::string source = value_or_throw(ports::clip_source(path));
     if (std::find(motions.sources.begin(), motions.sources.end(), source) == motions.sources.end())
       motions.sources.push_back(source);

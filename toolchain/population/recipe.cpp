@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "ports/motion/import.h"
 #include "toolchain/dataset/json_fields.h"
 #include "toolchain/error.h"
 #include "toolchain/train/run_directory.h"
@@ -61,11 +62,19 @@ std::vector<uint32_t> numbers(const JsonField& field) {
 }
 
 MotionPiece read_motion(const JsonField& json) {
-  allow_only(json, {"name", "clip", "start", "frames"});
-  MotionPiece motion{.clip = json["clip"].text(), .start = {}, .frames = {}};
+  allow_only(json, {"name", "clip", "start", "frames", "neutral"});
+  MotionPiece motion{.clip = json["clip"].text(), .start = {}, .frames = {}, .neutral = {}};
   motion.name = json.has("name") ? json["name"].text() : fs::path(motion.clip).stem().string();
   if (json.has("start")) motion.start = count(json["start"], 0, 1u << 20);
   if (json.has("frames")) motion.frames = count(json["frames"], 1, 1u << 20);
+  if (json.has("neutral")) {
+    const JsonField neutral = json["neutral"];
+    motion.neutral =
+        neutral.json().is_string() ? neutral.text() : std::to_string(count(neutral, 0, 1u << 20));
+    ports::RetargetOptions any;
+    if (const Status known = ports::set_neutral(motion.neutral, any); !known.ok())
+      neutral.fail(known.message());
+  }
   return motion;
 }
 

@@ -23,6 +23,8 @@ namespace figurine::population {
 struct MotionPiece {
   std::string name, clip;
   std::optional<uint32_t> start, frames;
+  std::string neutral;  // as --neutral of the motion commands: which of its poses is a T-pose;
+                        // empty: told by the clip
 };
 
 // Consecutive identities of one part of the split that choose from the same wardrobe.

@@ -9,6 +9,7 @@
 #include "gtest/gtest.h"
 #include "ports/host/files.h"
 #include "samples/program.h"
+#include "tests/toolchain/members/small_members.h"
 
 namespace figurine::cli::evaluate_members_test {
 namespace {
@@ -88,7 +89,31 @@ TEST(EvaluateMembers, SaysWhatAPopulationIsLike) {
       << "what is beyond N - 1 is N - 1";
   EXPECT_EQ(report.at("span_db").size(), 3u);
   EXPECT_EQ(report.at("interpolation").at("pairs").at(0).at("steps").size(), 5u);
+  EXPECT_EQ(report.at("span").at("by_kind").size(), 1u) << "kernels: they have no maps";
+  EXPECT_EQ(report.at("span").at("by_kind").at("kernels").size(), 3u);
+  EXPECT_TRUE(report.at("part_mixtures").is_null());
   for (const char* picture : {"wall.jpg", "strip.jpg", "worst.jpg"})
+    EXPECT_TRUE(is_jpeg(folder, picture)) << picture;
+}
+
+TEST(EvaluateMembers, OfMapsSaysWhatPartsAreLikeAndShowsBusts) {
+  const TestFolder folder;
+  const tests::SmallMembers people({.own_networks = false});
+  ASSERT_TRUE(
+      ports::write_file_atomically(folder.path("body.fgn"), people.body.bytes.bytes()).ok());
+  ASSERT_TRUE(ports::write_file_atomically(folder.path("people.fgn"), people.bytes.bytes()).ok());
+  const ProgramRun run = members(folder,
+                                 "people.fgn --body body.fgn --ranks 1 --part-mixtures parts.jpg "
+                                 "--bust-wall busts.jpg --wall wall.jpg");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json report = report_of(folder);
+  EXPECT_EQ(report.at("span").at("by_kind").size(), 1u);
+  EXPECT_EQ(report.at("span").at("by_kind").at("map").size(), 2u) << "ranks 1 and N - 1";
+  EXPECT_EQ(report.at("spectrum").at("by_kind").at("map").at("directions"), 4);
+  EXPECT_EQ(report.at("part_mixtures").at("pairs").at(0).at("rows").size(), 5u);
+  EXPECT_NE(run.out.find("map alone, rank 1"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("upper_body"), std::string::npos) << run.out;
+  for (const char* picture : {"parts.jpg", "busts.jpg", "wall.jpg"})
     EXPECT_TRUE(is_jpeg(folder, picture)) << picture;
 }
 
@@ -135,7 +160,12 @@ TEST(EvaluateMembers, BadInputGivesOneLineAndNothingElse) {
         {"six.fgn --body other_body.fgn", "does not fit the body: made for "},
         {"people.fgn --body body.fgn", "has 2 training members, at least 3 are needed"},
         {"six.fgn --body body.fgn --motion body.fgn", "is a package of kind body, not motion"},
-        {"six.fgn --body body.fgn --wall wall.png", "--wall: 'wall.png' must end in .jpg"}}) {
+        {"six.fgn --body body.fgn --wall wall.png", "--wall: 'wall.png' must end in .jpg"},
+        {"six.fgn --body body.fgn --bust-wall busts.png", "--bust-wall: 'busts.png' must end in"},
+        {"six.fgn --body body.fgn --bust-wall busts.jpg",
+         "--bust-wall: body 'jointed cylinder': has no texel that a joint called head"},
+        {"six.fgn --body body.fgn --part-mixtures parts.jpg",
+         "--part-mixtures: population 'people': its members have no static values"}}) {
     const ProgramRun run = members(folder, arguments);
     EXPECT_EQ(run.exit_code, 1) << arguments;
     EXPECT_EQ(run.error_lines(), 1u) << run.err;

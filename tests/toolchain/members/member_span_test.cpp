@@ -1,34 +1,91 @@
-// Mixtures of members: a mixture's ends are the members themselves.
+// The span by kind of weight: one kind is replaced, the other and the shape stay.
 #include "toolchain/members/member_span.h"
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <nlohmann/json.hpp>
 
-#include "runtime/test_packages.h"
+#include "tests/toolchain/members/small_members.h"
 
 namespace figurine::members::member_span_test {
 namespace {
 
-using tests::make_test_avatar;
-using tests::make_test_body;
+using tests::SmallMembers;
 
-TEST(Mix, EndsAreTheMembers) {
-  const tests::SyntheticBody body = make_test_body();
-  const tests::SyntheticAvatar one = make_test_avatar(body, {.shape = {1, 0}, .seed = 1}),
-                               two = make_test_avatar(body, {.shape = {0, 3}, .seed = 2});
-  const Avatar &a = one.package->avatar(), &b = two.package->avatar();
-  const measure::WeightLayout layout(a.network, a.shape.size());
-  measure::WeightStorage storage;
-  EXPECT_TRUE(std::ranges::equal(mix(layout, a, b, 0, storage).network.layers[0].weights,
-                                 a.network.layers[0].weights));
-  EXPECT_TRUE(std::ranges::equal(mix(layout, a, b, 1, storage).network.layers[0].weights,
-                                 b.network.layers[0].weights));
-  const Avatar middle = mix(layout, a, b, 0.5, storage);
-  EXPECT_FLOAT_EQ(middle.network.layers[0].bias[0],
-                  0.5f * (a.network.layers[0].bias[0] + b.network.layers[0].bias[0]));
-  EXPECT_FLOAT_EQ(middle.shape[0], 0.5f);
-  EXPECT_FLOAT_EQ(middle.shape[1], 1.5f);
+struct Measured {
+  explicit Measured(const tests::SmallMembersOptions& options)
+      : people(options), set(*people.package, *people.body.package, {.threads = 2, .quiet = true}) {
+    const MemberBases bases = make_bases(set);
+    spectrum = describe_spectrum(set, bases);
+    span = measure_span(set, bases, {1, 2});
+  }
+  SmallMembers people;
+  MemberSet set;
+  nlohmann::json spectrum, span;
+};
+
+std::vector<std::string> keys(const nlohmann::json& object) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : object.items()) names.push_back(name);
+  return names;
+}
+
+void expect_same_pictures(const nlohmann::json& rows, const nlohmann::json& others) {
+  ASSERT_EQ(rows.size(), 3u);
+  for (size_t i = 0; i < rows.size(); ++i) {
+    EXPECT_EQ(rows[i].at("rank"), others[i].at("rank"));
+    EXPECT_EQ(rows[i].at("span_db"), others[i].at("span_db"));
+    EXPECT_TRUE(rows[i].at("span_db").is_number());
+  }
+}
+
+TEST(SpanByKind, KernelsAreAllThereIsWhereMapsAndShapesAreAlike) {
+  const Measured same({.own_maps = false, .own_shapes = false});
+  EXPECT_EQ(keys(same.span.at("by_kind")), (std::vector<std::string>{"kernels", "map"}));
+  expect_same_pictures(same.span.at("by_kind").at("kernels"), same.span.at("per_layer"));
+  for (const nlohmann::json& row : same.span.at("by_kind").at("map")) {
+    EXPECT_TRUE(row.at("span_db").is_null()) << "nothing was replaced";
+    EXPECT_TRUE(row.at("variance_kept").is_null()) << "there is none";
+  }
+  EXPECT_EQ(same.spectrum.at("by_kind").at("map").at("entries"), 0);
+  EXPECT_EQ(same.spectrum.at("by_kind").at("kernels").at("share_of_whole"), 1.0);
+  EXPECT_EQ(same.spectrum.at("by_kind").at("kernels").at("directions"),
+            same.spectrum.at("whole").at("directions"));
+}
+
+TEST(SpanByKind, OfOneNetworkOnlyTheMapIsReplacedAndTheShapeKept) {
+  const Measured map({.own_networks = false, .own_shapes = false}), shapes({.own_networks = false});
+  EXPECT_EQ(keys(map.span.at("by_kind")), std::vector<std::string>{"map"});
+  EXPECT_EQ(keys(map.spectrum.at("by_kind")), std::vector<std::string>{"map"});
+  expect_same_pictures(map.span.at("by_kind").at("map"), map.span.at("per_layer"));
+  // Where shapes differ as well, projecting the map alone leaves them and so loses less.
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_GT(shapes.span.at("by_kind").at("map")[i].at("span_db").get<double>(),
+              shapes.span.at("per_layer")[i].at("span_db").get<double>());
+  }
+  EXPECT_LT(shapes.spectrum.at("by_kind").at("map").at("share_of_whole").get<double>(), 1);
+}
+
+TEST(SpanByKind, BothKindsTogetherLoseWhatAllTokensLose) {
+  const Measured both({.own_shapes = false});
+  const nlohmann::json &kinds = both.span.at("by_kind"), &all = both.span.at("per_layer");
+  for (size_t i = 0; i < 3; ++i) {
+    const double least = std::min(kinds.at("kernels")[i].at("span_db").get<double>(),
+                                  kinds.at("map")[i].at("span_db").get<double>());
+    EXPECT_LT(all[i].at("span_db").get<double>(), least + 0.5);
+    // The whole's variance is that of its kinds.
+    EXPECT_NEAR(both.spectrum.at("by_kind").at("kernels").at("share_of_whole").get<double>() +
+                    both.spectrum.at("by_kind").at("map").at("share_of_whole").get<double>(),
+                1, 1e-9);
+  }
+  EXPECT_GE(kinds.at("map")[2].at("variance_kept").get<double>(),
+            kinds.at("map")[0].at("variance_kept").get<double>());
+}
+
+TEST(SpanByKind, WithoutMapsThereAreKernelsAlone) {
+  const Measured old({.maps = false});
+  EXPECT_EQ(keys(old.span.at("by_kind")), std::vector<std::string>{"kernels"});
+  EXPECT_EQ(keys(old.spectrum.at("by_kind")), std::vector<std::string>{"kernels"});
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <stdexcept>
 
@@ -24,7 +25,7 @@ TEST(ShotRenderer, FramesWhatItLookedAt) {
   const tests::SyntheticAvatar avatar = make_test_avatar(body);
   const tests::SyntheticPose pose = tests::make_test_pose(body.body(), 1);
   ShotRenderer renderer(*body.package, {{pose.root_translation_m, pose.rotations}},
-                        {{.pose = 0, .azimuth_deg = 20, .grounded = true}});
+                        {{.pose = 0, .azimuth_deg = 20, .subject = Subject::kGrounded}});
   renderer.frame(0, renderer.look(avatar.package->avatar())[0], 60, 90, 0.2f);
   const std::vector<Picture> pictures = renderer.draw(avatar.package->avatar(), 0, 1);
   ASSERT_EQ(pictures.size(), 1u);
@@ -38,6 +39,28 @@ TEST(ShotRenderer, FramesWhatItLookedAt) {
   ASSERT_GT(count, 0);
   EXPECT_NEAR(x / count, 30, 10);
   EXPECT_NEAR(y / count, 45, 15);
+}
+
+TEST(ShotRenderer, MovesEveryBustIntoTheMiddle) {
+  const tests::SyntheticBody body = make_test_body({.joint_names = tests::kPersonJoints});
+  const tests::SyntheticAvatar one = make_test_avatar(body, {.shape = {0, 0}}),
+                               other = make_test_avatar(body, {.shape = {20, -15}});
+  const tests::SyntheticPose pose = tests::make_test_pose(body.body(), 1);
+  ShotRenderer renderer(*body.package, {{pose.root_translation_m, pose.rotations}},
+                        {{.pose = 0, .azimuth_deg = 20, .subject = Subject::kPlaced},
+                         {.pose = 0, .azimuth_deg = 20, .subject = Subject::kBust}});
+  const std::vector<Extent> first = renderer.look(one.package->avatar()),
+                            second = renderer.look(other.package->avatar());
+  const auto middle = [](const Extent& e) { return 0.5f * (e.top + e.bottom); };
+  EXPECT_GT(std::abs(middle(first[0]) - middle(second[0])), 0.01f) << "they differ in height";
+  for (const Extent& bust : {first[1], second[1]}) {
+    EXPECT_NEAR(middle(bust), 0, 0.01f);
+    EXPECT_NEAR(0.5f * (bust.left + bust.right), 0, 0.01f);
+    EXPECT_LT(bust.bottom - bust.top, 0.6f * (first[0].bottom - first[0].top));
+  }
+  renderer.frame(1, first[1], 40, 40, 0.1f);
+  const Picture picture = renderer.draw(one.package->avatar(), 1, 2).front();
+  EXPECT_GT(picture.rgba[4 * (20 * 40 + 20) + 3], 128) << "the middle is covered";
 }
 
 TEST(Crew, DoesEveryPieceAndPassesOnWhatIsThrown) {

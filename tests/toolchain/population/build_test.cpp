@@ -68,6 +68,45 @@ size_t entries(const std::string& folder) {
                             : 0;
 }
 
+// Before anybody is photographed: a line a clip, and an error where it cannot be a person's.
+TEST(BuildPopulation, SaysWhatItsMotionsAreAndRefusesWhatTheyCannotBe) {
+  nlohmann::json recipe = testing_tools::small_recipe();
+  recipe["motions"] = {{{"clip", FIGURINE_SOURCE_DIR "/tests/data/cases/bvh-no-tpose/in.bvh"},
+                        {"name", "walk"},
+                        {"neutral", "first"}}};
+  const auto built = [](const Workplace& place) {
+    std::string error;
+    testing::internal::CaptureStderr();
+    try {
+      build(place.options("state"));
+    } catch (const InputError& refused) {
+      error = refused.what();
+    }
+    return std::pair(testing::internal::GetCapturedStderr(), error);
+  };
+  {
+    // Too short for the recipe's captures: it ends there.
+    recipe["motions"][0]["frames"] = 4;
+    const auto [said, error] = built(Workplace(recipe));
+    EXPECT_NE(said.find("motion walk: 4 frames at 30 a second, soles in contact"),
+              std::string::npos)
+        << said;
+    EXPECT_NE(said.find("; read: "), std::string::npos) << said;
+    EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
+    EXPECT_NE(error, "");
+  }
+  {
+    recipe["motions"][0].erase("neutral");
+    const auto [said, error] = built(Workplace(recipe));
+    EXPECT_EQ(said, "");
+    EXPECT_NE(error.find("T-pose"), std::string::npos) << error;
+  }
+  {
+    recipe["motions"] = {{{"clip", "swinging.fgn"}, {"neutral", 3}}};
+    EXPECT_NE(built(Workplace(recipe)).second.find("this is a motion package"), std::string::npos);
+  }
+}
+
 TEST(BuildPopulation, LeavesMembersTableSplitAndPackage) {
   const Workplace place;
   build(place.options("state"));
@@ -135,6 +174,20 @@ TEST(BuildPopulation, OfOneNetworkHoldsItOnceAndAMapForEach) {
   }
   const nlohmann::json row = train::read_json(state.row("000010"));
   EXPECT_GT(row.at("quality").at("held_out_views").at("psnr_db").get<double>(), 10);
+  // What a member was measured to be comes through its package, busts and views as well.
+  for (const auto& [name, group, metric] :
+       {std::tuple{"psnr_pose_db", "held_out_poses", "psnr_db"},
+        {"highpass_correlation", "held_out_poses", "highpass_correlation"},
+        {"bust_head_psnr_db", "held_out_poses", "bust_head_psnr_db"},
+        {"view_highpass_ratio", "held_out_views", "highpass_ratio"},
+        {"view_bust_psnr_db", "held_out_views", "bust_psnr_db"},
+        {"view_bust_highpass_correlation", "held_out_views", "bust_highpass_correlation"}}) {
+    const auto at = std::ranges::find(population.quality_names, name);
+    ASSERT_NE(at, population.quality_names.end()) << name;
+    EXPECT_EQ(population.members[3].quality[size_t(at - population.quality_names.begin())],
+              row.at("quality").at(group).at(metric).get<double>())
+        << name;
+  }
   EXPECT_LT(std::abs(row.at("rounding").at("views").at("loss_db").get<double>()), 1);
   EXPECT_EQ(entries(state.initial()), 2u) << "weights and avatar; captures and run are gone";
 

@@ -27,10 +27,11 @@ inline nlohmann::json small_recipe() {
   })");
 }
 
-// The same people with one network for all and a static map each.
+// The same people, seen from near by as well, with one network for all and a static map each.
 inline nlohmann::json small_shared_recipe() {
   nlohmann::json recipe = small_recipe();
   recipe.erase("initial_weights");
+  recipe["capture"]["bust_views"] = 6;
   recipe["shared_network"] = {{"identities", 2}, {"iterations", 40}, {"poses", 2}};
   recipe["training"]["static_grids"] = "all:T";
   recipe["training"]["network_size"] = 16;

@@ -1,0 +1,34 @@
+// Which texels are what of a person: head, upper body, lower body, hands, by the joint that moves a
+// texel most. Joints are known by the names of SMPL-X, so it works for any body that has them,
+// whatever its mesh.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "figurine/body.h"
+
+namespace figurine::pictures {
+
+// The joint with a texel's largest skin weight, of equals the first.
+uint8_t strongest_joint(const Body& body, uint32_t texel);
+
+// Hands are a part of their own: who puts on a jacket keeps the hands. kOther: of no joint with a
+// known name and no such parent.
+enum class BodyPart : uint8_t { kHead, kUpperBody, kLowerBody, kHands, kOther };
+
+// [J] by name: neck, head, jaw and eyes; spine, collars, shoulders and elbows; pelvis, hips, knees,
+// ankles and feet; wrists. A joint of another name goes with its parent (fingers, toes, hair).
+std::vector<BodyPart> joint_parts(const Body& body);
+// [N] of a texel's strongest joint.
+std::vector<BodyPart> texel_parts(const Body& body);
+
+// Texels that head, neck and collar bones move most: head and shoulders, as captures frame them.
+// None where the body has no joint called "head".
+std::vector<uint32_t> bust_texels(const Body& body);
+
+}  // namespace figurine::pictures
