@@ -71,8 +71,13 @@ int run(const std::string& output) {
               {"date", date()},
               {"rows", Json::array()}};
   size_t broken = 0;
-  for (std::span<const Case> cases : {splat_cases(), pose_cases(), live_cases(), package_cases(),
-                                      fixed_point_cases(), sampling_cases(), sampler_cases()}) {
+  for (std::span<const Case> cases :
+       {splat_cases(), file_cases(), pose_cases(), live_cases(), package_cases(),
+        fixed_point_cases(), sampling_cases(), sampler_cases(),
+#if FIGURINE_HAS_TRAINER
+        training_cases()
+#endif
+       }) {
     for (const Case& one : cases) {
       for (const Row& row : one.run()) {
         report["rows"].push_back(

@@ -30,11 +30,13 @@ struct Case {
 };
 
 std::span<const Case> splat_cases();
+std::span<const Case> file_cases();
 std::span<const Case> pose_cases();
 std::span<const Case> live_cases();
 std::span<const Case> package_cases();
 std::span<const Case> fixed_point_cases();
 std::span<const Case> sampling_cases();
 std::span<const Case> sampler_cases();
+std::span<const Case> training_cases();  // where the toolchain is built
 
 }  // namespace figurine::stability

@@ -45,7 +45,6 @@ struct SmallCapture {
         package.package, {swinging_clip(120)}, nullptr);
   }
 
- private:
   // Legs and arms swing, the trunk sways, fingers curl.
   static ports::MotionClip swinging_clip(uint32_t frames) {
     ports::MotionClip clip;
