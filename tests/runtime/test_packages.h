@@ -47,7 +47,7 @@ struct SyntheticBodyOptions {
   std::vector<std::string> joint_names = {};  // [joints]; empty: "joint0", ...
 };
 // Of the chain of four, so that the cylinder has a head, an upper and a lower body.
-inline const std::vector<std::string> kPersonJoints{"pelvis", "spine1", "neck", "head"};
+inline const std::vector<std::string> kPersonJoints{"left_knee", "pelvis", "spine1", "head"};
 
 struct SyntheticBody {
   AlignedBytes bytes;

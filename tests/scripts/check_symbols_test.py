@@ -54,7 +54,7 @@ BREACHES = [  # (file, source, words of the finding)
     (POOL, "#include <cstdlib>\nchar* f() { return std::getenv(\"HOME\"); }",
      "environment: getenv"),
     (SO, "extern char large[];\nchar large[600000] = {1};\n#include <cstdlib>\n"
-         "void* f() { return std::malloc(1); }", "the limit is 560000"),
+         "void* f() { return std::malloc(1); }", "the limit is 600000"),
     (POOL, "extern char large[];\nchar large[100000] = {1};\n#include <cstdlib>\n"
            "void* f() { return std::malloc(1); }", "the limit is 80000"),
     *[(archive, CALL.format("std::exp(x)"), "libm: exp") for archive in ARCHIVES],

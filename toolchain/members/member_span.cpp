@@ -135,9 +135,12 @@ void replace_member(const MemberSet& set, const MemberBases& bases,
     weights.segment(begin, size) = set.standardisation.restore(instead).segment(begin, size);
     replacement.lost[h] = (z - instead).segment(begin, size).squaredNorm();
     replacement.all[h] = z.segment(begin, size).squaredNorm();
-    replacement.error[h] =
-        error_to(own, set.draw(set.layout.with(opened.avatar,
-                                               {weights.data(), size_t(weights.size())}, storage)));
+    Avatar replaced =
+        set.layout.with(opened.avatar, {weights.data(), size_t(weights.size())}, storage);
+    // A map that is not replaced is not rounded anew either.
+    if (static_cast<size_t>(begin + size) <= set.layout.network_size())
+      replaced.static_part = opened.avatar.static_part;
+    replacement.error[h] = error_to(own, set.draw(replaced));
   };
   const auto try_weights = [&](const RowVector& instead, Replacement& replacement) {
     try_stretch(instead, 0, instead.size(), replacement);

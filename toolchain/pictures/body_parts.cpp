@@ -66,7 +66,13 @@ std::vector<BodyPart> joint_parts(const Body& body) {
 std::vector<BodyPart> texel_parts(const Body& body) {
   const std::vector<BodyPart> of_joint = joint_parts(body);
   std::vector<BodyPart> parts(body.texel_count());
-  for (uint32_t i = 0; i < body.texel_count(); ++i) parts[i] = of_joint[strongest_joint(body, i)];
+  for (uint32_t i = 0; i < body.texel_count(); ++i) {
+    const size_t joint = strongest_joint(body, i);
+    const bool waist =
+        body.joint_names[joint] == "pelvis" &&
+        body.texel_position_m[size_t{3} * i + 1] > body.joint_position_m[3 * joint + 1];
+    parts[i] = waist ? BodyPart::kUpperBody : of_joint[joint];
+  }
   return parts;
 }
 

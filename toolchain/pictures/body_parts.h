@@ -24,7 +24,8 @@ enum class BodyPart : uint8_t { kHead, kUpperBody, kLowerBody, kHands, kOther };
 // [J] by name: neck, head, jaw and eyes; spine, collars, shoulders and elbows; pelvis, hips, knees,
 // ankles and feet; wrists. A joint of another name goes with its parent (fingers, toes, hair).
 std::vector<BodyPart> joint_parts(const Body& body);
-// [N] of a texel's strongest joint.
+// [N] of a texel's strongest joint; but of what the pelvis moves, the waist above its joint is of
+// the upper body, where shirts hang over trousers.
 std::vector<BodyPart> texel_parts(const Body& body);
 
 // Texels that head, neck and collar bones move most: head and shoulders, as captures frame them.

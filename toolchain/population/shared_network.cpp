@@ -61,7 +61,8 @@ void make_shared_network(const Workshop& workshop, unsigned slots,
   const SharedNetworkRecipe& recipe = workshop.recipe.shared;
   const State& state = workshop.state;
   if (recipe.identities == 0 || fs::exists(state.initial_weights())) return;
-  const std::string captures = state.initial() + "/captures", run = state.initial() + "/run";
+  // Where members look for theirs: these people become members too.
+  const std::string captures = state.captures(), run = state.initial() + "/run";
   const std::vector<Identity> people = learners(workshop.recipe, recipe.identities);
   SharedNetworkProgress at{.people = people.size()};
   run_all(
@@ -85,7 +86,6 @@ void make_shared_network(const Workshop& workshop, unsigned slots,
         show(at);
       });
   fs::remove_all(run);
-  fs::remove_all(captures);
 }
 
 }  // namespace figurine::population

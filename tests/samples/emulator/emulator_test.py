@@ -138,7 +138,7 @@ class Emulator(unittest.TestCase):
         self.assertEqual(state["profile"], "a53-board")
         self.assertGreater(state["estimated_ms"], state["frame_ms"])
         study = state["study"]["switches"]
-        self.assertEqual(len(study), 12)
+        self.assertEqual(len(study), 13)
         self.assertTrue(study["stopped"]["same"])
         self.assertGreater(study["fast-blend"]["error_db"], 45)
         self.assertLess(study["averted-above"]["error_db"], 45)
