@@ -2,6 +2,7 @@
 // refused with a reason, and nothing outside the bytes is read.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
 
@@ -356,6 +357,45 @@ TEST(PackageLimits, RejectsIndicesThatCostTooMuch) {
                      parts.blobs.push_back(extra_blob("future." + std::to_string(i), true));
                  }),
                  StatusCode::kLimitExceeded, "index.blobs");
+}
+
+// An index of 240 kB in which every source is one text, as long as all of them together: read, it
+// would be 400 MB of strings.
+TEST(PackageLimits, RejectsAnIndexThatSaysOneLongTextAThousandTimes) {
+  const MotionSample sample;
+  Provenance provenance = samples::make_provenance();
+  provenance.sources.assign(layout::kMaxListEntries, std::string(200, 'x'));
+  Bytes bytes = *write_package(sample.motion, provenance);
+  const Seal seal(bytes);
+  ASSERT_TRUE(open_status(bytes).ok());
+  const auto u32_at = [&](size_t at) {
+    uint32_t value = 0;
+    std::memcpy(&value, &bytes[at], 4);
+    return value;
+  };
+  // A list is its length and the distances of its texts, which lie behind it: length, bytes, zero.
+  const layout::Header header = get_header(bytes);
+  const size_t begin = header.index_offset, end = begin + header.index_bytes;
+  size_t first = 0, last = 0, list = 0;
+  for (size_t at = begin; at + 205 <= end; at += 4) {
+    if (u32_at(at) != 200 || u32_at(at + 4) != 0x78787878) continue;
+    if (first == 0) first = at;
+    last = at;
+  }
+  for (size_t at = begin; at < first && list == 0; at += 4) {
+    const size_t text = at + 4 + u32_at(at + 4);
+    if (u32_at(at) == layout::kMaxListEntries && text >= first && text <= last) list = at;
+  }
+  ASSERT_GT(list, 0u);
+  for (size_t entry = list + 4; entry < list + 4 + 4 * size_t{layout::kMaxListEntries};
+       entry += 4) {
+    const auto distance = static_cast<uint32_t>(first - entry);
+    std::memcpy(&bytes[entry], &distance, 4);
+  }
+  const auto length = static_cast<uint32_t>(last + 200 - first);
+  std::memcpy(&bytes[first], &length, 4);
+  seal.renew(bytes);
+  expect_refused(open_status(bytes), StatusCode::kLimitExceeded, "index: its texts and lists take");
 }
 
 }  // namespace
