@@ -7,6 +7,7 @@
 #include "formats/opened.h"
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
+#include "formats/refusals.h"
 #include "formats/writer/package_parts.h"
 
 namespace figurine::package_filters_test {
@@ -15,18 +16,11 @@ namespace {
 using samples::AvatarSample;
 using samples::BodySample;
 using samples::ExactBytes;
+using samples::expect_refused;
 using samples::FilteredAvatarSample;
 using samples::open_or_die;
 using samples::Opened;
 using samples::same;
-
-void expect_refused(const Status& status, const std::string& words,
-                    StatusCode code = StatusCode::kCorrupt) {
-  EXPECT_STREQ(to_string(status.code()), to_string(code)) << status.message();
-  EXPECT_NE(status.message().find(words), std::string::npos)
-      << status.message() << " should mention: " << words;
-  EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
-}
 
 // The status of opening what the writer might have refused: bent after it was taken apart.
 template <class Sample = FilteredAvatarSample, class Bend>

@@ -8,6 +8,7 @@
 
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
+#include "formats/refusals.h"
 #include "formats/src/package/text.h"
 #include "formats/writer/package_parts.h"
 
@@ -17,20 +18,13 @@ namespace {
 using samples::AvatarSample;
 using samples::BodySample;
 using samples::ExactBytes;
+using samples::expect_refused;
 using samples::FixedPointAvatarSample;
 using samples::MotionSample;
 using samples::Seal;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-void expect_refused(const Status& status, const std::string& words,
-                    StatusCode code = StatusCode::kCorrupt) {
-  EXPECT_STREQ(to_string(status.code()), to_string(code)) << status.message();
-  EXPECT_NE(status.message().find(words), std::string::npos)
-      << status.message() << " should mention: " << words;
-  EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
-}
 
 // The status of writing a sample after something was done to it.
 template <class Sample>

@@ -11,12 +11,14 @@
 #include "formats/opened.h"
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
+#include "formats/refusals.h"
 #include "formats/writer/package_parts.h"
 
 namespace figurine::package_sampler_test {
 namespace {
 
 using samples::ExactBytes;
+using samples::expect_refused;
 using samples::open_or_die;
 using samples::Opened;
 using samples::same;
@@ -203,14 +205,6 @@ TEST(HashWeights, IsOneHashOfAllBytesInTheirOrder) {
 }
 
 // ---- The writer ---------------------------------------------------------------------------------
-
-void expect_refused(const Status& status, const std::string& words,
-                    StatusCode code = StatusCode::kCorrupt) {
-  EXPECT_STREQ(to_string(status.code()), to_string(code)) << status.message();
-  EXPECT_NE(status.message().find(words), std::string::npos)
-      << status.message() << " should mention: " << words;
-  EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
-}
 
 // The status of writing a sample after something was done to it.
 Status bent(const std::function<void(SamplerSample&)>& bend) {

@@ -8,6 +8,7 @@
 #include "formats/opened.h"
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
+#include "formats/refusals.h"
 #include "formats/writer/package_parts.h"
 
 namespace figurine::package_static_test {
@@ -16,6 +17,7 @@ namespace {
 using samples::AvatarSample;
 using samples::BodySample;
 using samples::ExactBytes;
+using samples::expect_refused;
 using samples::open_or_die;
 using samples::Opened;
 using samples::same;
@@ -24,14 +26,6 @@ using samples::StaticOnlyAvatarSample;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-void expect_refused(const Status& status, const std::string& words,
-                    StatusCode code = StatusCode::kCorrupt) {
-  EXPECT_STREQ(to_string(status.code()), to_string(code)) << status.message();
-  EXPECT_NE(status.message().find(words), std::string::npos)
-      << status.message() << " should mention: " << words;
-  EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
-}
 
 template <class Sample = StaticAvatarSample, class Bend>
 Status bent(const Bend& bend) {

@@ -11,12 +11,14 @@
 #include "formats/opened.h"
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
+#include "formats/refusals.h"
 #include "formats/writer/package_parts.h"
 
 namespace figurine::population_static_test {
 namespace {
 
 using samples::ExactBytes;
+using samples::expect_refused;
 using samples::open_or_die;
 using samples::Opened;
 using samples::same;
@@ -24,13 +26,6 @@ using samples::StaticPopulationSample;
 
 constexpr DifferenceCoding kCodings[] = {DifferenceCoding::kInt8, DifferenceCoding::kHalf,
                                          DifferenceCoding::kNone};
-
-void expect_refused(const Status& status, const std::string& words,
-                    StatusCode code = StatusCode::kCorrupt) {
-  EXPECT_STREQ(to_string(status.code()), to_string(code)) << status.message();
-  EXPECT_NE(status.message().find(words), std::string::npos)
-      << status.message() << " should mention: " << words;
-}
 
 TEST(StaticCode, EveryIntegerComesBackFromEveryPrediction) {
   for (int predicted = -127; predicted <= 127; ++predicted) {

@@ -15,6 +15,7 @@
 #include "formats/opened.h"
 #include "formats/package_bytes.h"
 #include "formats/package_samples.h"
+#include "formats/refusals.h"
 #include "formats/writer/package_parts.h"
 #include "formats/writer/rans_encoder.h"
 
@@ -23,6 +24,7 @@ namespace {
 
 using samples::AvatarSample;
 using samples::ExactBytes;
+using samples::expect_refused;
 using samples::open_or_die;
 using samples::Opened;
 using samples::PopulationSample;
@@ -326,14 +328,6 @@ TEST(PopulationMembers, AreFoundByNameThenByNumber) {
 }
 
 // ---- Members that do not belong together --------------------------------------------------------
-
-void expect_refused(const Status& status, const std::string& words,
-                    StatusCode code = StatusCode::kCorrupt) {
-  EXPECT_STREQ(to_string(status.code()), to_string(code)) << status.message();
-  EXPECT_NE(status.message().find(words), std::string::npos)
-      << status.message() << " should mention: " << words;
-  EXPECT_EQ(status.message().find('\n'), std::string::npos) << status.message();
-}
 
 Status bent(const std::function<void(PopulationSample&)>& bend,
             DifferenceCoding coding = DifferenceCoding::kInt8) {
