@@ -154,20 +154,21 @@ void LineFeed::take_pose(uint64_t& count, const char* what, const Parse& parse) 
       wrong = pose.status();
     }
   }
-  uint64_t malformed = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    ++count;
-    if (wrong.ok()) {
-      for (size_t s = 0; s < poses.size(); ++s) skeletons_[s]->newest = std::move(poses[s]);
-      newest_ns_ = now_ns;
-      ++poses_;
-    } else {
-      malformed = ++malformed_;
-    }
+  // Said before it is counted: who sees it counted can read what was said. No other thread writes
+  // the number.
+  if (!wrong.ok() && malformed_ < kMostSaid) {
+    const bool last = malformed_ + 1 == kMostSaid;
+    options_.say(wrong.message() + (last ? " (others are counted only)" : ""));
   }
-  if (malformed == 0 || malformed > kMostSaid) return;
-  options_.say(wrong.message() + (malformed == kMostSaid ? " (others are counted only)" : ""));
+  const std::lock_guard lock(mutex_);
+  ++count;
+  if (!wrong.ok()) {
+    ++malformed_;
+    return;
+  }
+  for (size_t s = 0; s < poses.size(); ++s) skeletons_[s]->newest = std::move(poses[s]);
+  newest_ns_ = now_ns;
+  ++poses_;
 }
 
 Status LineFeed::advance(uint64_t) {
