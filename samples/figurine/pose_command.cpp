@@ -58,8 +58,7 @@ Status run_pose(const PoseOptions& options) {
     const Result<PoseRarity> found = rarity_of(options, motion);
     if (!found.ok()) return found.status();
     rarity = *found;
-    ports::sayf("%s: frame %u: %s", options.from.c_str(), options.frame,
-                describe(*rarity).c_str());
+    ports::sayf("%s: frame %u: %s", options.from.c_str(), options.frame, describe(*rarity).c_str());
   }
   const std::string text = write_pose_json(motion.pose(options.frame), motion.joint_names);
   if (options.output.empty()) {
