@@ -124,6 +124,21 @@ TEST_F(MemberFolder, SaysWhatIsWrongInALine) {
       << error_of("people#ada");
 }
 
+// The shipped one: members of one network, each a file that says how good it is.
+TEST_F(MemberFolder, TheShippedOneHasPeople) {
+  const std::string folder = FIGURINE_SOURCE_DIR "/samples/populations/edge";
+  const auto loaded = load_avatar(folder + "#0");
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  EXPECT_EQ((*loaded)->avatar.name, "000000");
+  EXPECT_FALSE((*loaded)->avatar.network.layers.empty()) << "everybody's";
+  EXPECT_FALSE((*loaded)->avatar.static_part.groups.empty()) << "its own";
+  EXPECT_TRUE(find_body(**loaded, "").ok());
+  const tests::ProgramRun run = tests::run_figurine("render '" + folder + "#000000' --size 96x96" +
+                                                    " --json -o " + folder_.path("member.png"));
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(folder_.has("member.png"));
+}
+
 TEST_F(MemberFolder, IsDrawnByTheProgram) {
   const tests::ProgramRun run = tests::run_figurine("render " + folder_.path("people#bob") +
                                                     " --size 48x48 -o " + folder_.path("bob.png"));
