@@ -404,7 +404,7 @@ typedef struct fig_pose_rarity {
   float share_beyond; /* of the training poses, those that are farther out; 0 to 1 */
 } fig_pose_rarity;
 FIG_DEFAULT(pose_rarity)
-/* About 10 us; allocates nothing. */
+/* Allocates nothing. */
 FIG_API fig_status fig_renderer_pose_rarity(fig_renderer renderer, fig_avatar avatar,
                                             const fig_pose* pose, fig_pose_rarity* rarity);
 

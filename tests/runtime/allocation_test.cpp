@@ -61,7 +61,7 @@ void expect_no_allocations(uint32_t threads, Held held, const Approximation& app
     cameras.back().fy_px *= 1 + 0.1f * static_cast<float>(frame);
   }
   std::vector<uint8_t> rgba(200 * 160 * 4);
-  uint64_t after_first = 0, first_pairs = 0, largest_pairs = 0;
+  uint64_t after_first = 0, first_pairs = 0, largest_pairs = 0, pulled = 0;
   for (uint32_t frame = 0; frame < kFrames; ++frame) {
     const FrameAvatar seen[] = {
         {.avatar = *a, .pose = poses[frame].view(), .keep_to_known = keep_to_known},
@@ -74,12 +74,15 @@ void expect_no_allocations(uint32_t threads, Held held, const Approximation& app
                               .approximation = approximation},
                              {.pixels = rgba.data(), .stride_bytes = 800})
                     .ok());
+    ASSERT_TRUE(renderer->pose_rarity(*a, poses[frame].view()).ok());
+    pulled += renderer->statistics().pulled_poses;
     if (frame == 0) after_first = g_allocations;
     (frame == 0 ? first_pairs : largest_pairs) =
         std::max(largest_pairs, renderer->statistics().pairs);
   }
   EXPECT_EQ(g_allocations - after_first, 0u) << threads << " threads";
   EXPECT_GT(largest_pairs, first_pairs);
+  EXPECT_EQ(pulled > 0, keep_to_known);
 }
 
 TEST(Allocation, NoFrameAllocatesAfterTheFirst) {

@@ -152,8 +152,8 @@ Rows gradients_of_layers() {
 // How a training ends, and whether all that it left can be used.
 struct End {
   bool refused = false;
-  size_t not_finite = 0;  // files that hold such a value, or cannot be read
-  double psnr_db = 0;
+  size_t not_finite = 0;  // files that hold a value that is none, or cannot be read
+  bool usable = false;    // it ended with weights and a PSNR that is a number
 };
 
 End train(const testing_tools::SmallCapture& capture, const std::string& data,
@@ -170,7 +170,8 @@ End train(const testing_tools::SmallCapture& capture, const std::string& data,
   if (change) change(request.settings);
   End end;
   try {
-    end.psnr_db = train::train_avatar(request).psnr_db;
+    end.usable = std::isfinite(train::train_avatar(request).psnr_db) &&
+                 fs::exists(train::RunDirectory{run}.weights());
   } catch (const InputError&) {
     end.refused = true;
   }
@@ -198,12 +199,12 @@ Rows exploding_steps() {
         settings.static_learning_rate = rate;
         settings.clip_gradient = clip;
       });
-      not_finite += end.not_finite;
+      not_finite += end.not_finite + (!end.refused && !end.usable);
       ++ended;
     }
   }
-  return {{"training: learning rates of 1 to 1e30", "files of weights with a value that is none",
-           Bound::kAtMost, 0, double(not_finite)}};
+  return {{"training: learning rates of 1 to 1e30", "neither refused nor finite", Bound::kAtMost, 0,
+           double(not_finite)}};
 }
 
 // One image of one pose: inputs do not vary at all, and a picture can be learnt.
@@ -225,10 +226,10 @@ Rows one_image() {
   };
   const End one = end_of(1, 1, "_image");
   rows.push_back({"training: one image", "neither refused nor finite", Bound::kAtMost, 0,
-                  double(one.not_finite)});
+                  double(one.not_finite + (!one.refused && !one.usable))});
   const End pose = end_of(1, 8, "_pose");
   rows.push_back({"training: one pose, so that no input varies", "neither refused nor finite",
-                  Bound::kAtMost, 0, double(pose.not_finite)});
+                  Bound::kAtMost, 0, double(pose.not_finite + (!pose.refused && !pose.usable))});
   return rows;
 }
 

@@ -69,7 +69,7 @@ KnownPoseStatistics known_poses(const std::vector<std::vector<float>>& poses,
   KnownPoseStatistics others{.joints = all.joints, .mean = {}, .covariance = {}, .distances = {}};
   for (size_t fold = 0; fold < folds; ++fold) {
     const size_t begin = fold * poses.size() / folds, end = (fold + 1) * poses.size() / folds;
-    folds > 1 ? measure(rows, begin, end, others) : measure(rows, 0, 0, others);
+    measure(rows, begin, folds > 1 ? end : begin, others);  // of one pose its own
     const KnownPoses known = value_or_throw(KnownPoses::create(others.view()), "training poses");
     for (size_t i = begin; i < end; ++i)
       distances.push_back(std::min(known.distance(poses[i]), double{kMaxPoseDistance}));

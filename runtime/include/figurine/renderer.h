@@ -86,7 +86,7 @@ class Renderer {
 
   // How unusual a pose is to an avatar. None if its package has no table of distances
   // (PoseStatistics), or was opened without it. kInvalidArgument on an unsound pose, or if there is
-  // no avatar of this id. About 10 us; allocates nothing.
+  // no avatar of this id. Allocates nothing.
   Result<std::optional<PoseRarity>> pose_rarity(AvatarId avatar, const PoseView& pose) const;
 
   Isa isa() const;                            // of the kernels that run
