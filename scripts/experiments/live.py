@@ -1,4 +1,4 @@
-"""What `figurine live` does in time: latency, dropped and late frames, poses over VMC, hostile packets.
+"""`figurine live` in time: latency, dropped and late frames, poses over VMC, hostile packets.
 
     scripts/run python3 scripts/experiments/live.py BUILD [OUTPUT] [--seconds 600]
         [--fuzz-runs 10000000] [--rates 30 60] [--vivid GUEST]
