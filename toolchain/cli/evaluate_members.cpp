@@ -14,10 +14,10 @@
 #include "toolchain/cli/threads.h"
 #include "toolchain/error.h"
 #include "toolchain/json_number.h"
+#include "toolchain/measure/body_parts.h"
 #include "toolchain/members/member_sheets.h"
 #include "toolchain/members/members.h"
 #include "toolchain/model/threads.h"
-#include "toolchain/pictures/body_parts.h"
 #include "toolchain/train/package_file.h"
 #include "toolchain/train/population_file.h"
 #include "toolchain/train/run_directory.h"
@@ -151,10 +151,10 @@ void run_members(const MembersArguments& arguments) {
   }
   // What cannot be drawn is said before everybody is.
   const std::string obstacle =
-      members::part_mixture_obstacle(population.package.population(), body.package.body());
+      measure::part_mixture_obstacle(population.package.population(), body.package.body());
   if (!arguments.part_mixtures.empty() && !obstacle.empty())
     throw InputError("--part-mixtures: " + obstacle);
-  if (!arguments.bust_wall.empty() && pictures::bust_texels(body.package.body()).empty())
+  if (!arguments.bust_wall.empty() && measure::bust_texels(body.package.body()).empty())
     throw InputError("--bust-wall: body '" + body.package.body().name +
                      "': has no texel that a joint called head, neck or collar moves most");
   const members::MemberSet set(population.package, body.package,
@@ -169,7 +169,7 @@ void run_members(const MembersArguments& arguments) {
                         {"date", train::utc_now()},
                         {"package", arguments.population},
                         {"package_hash", format_hash(population.package.content_hash())}};
-  std::optional<members::PartExchange> parts;
+  std::optional<measure::PartExchange> parts;
   if (obstacle.empty()) parts.emplace(population.package.population(), body.package.body());
   report.update(members::evaluate_members(set, distances, pairs, parts ? &*parts : nullptr,
                                           arguments.options));

@@ -111,6 +111,16 @@ void add_sampler_command(CLI::App& app) {
       ->add_option("--members", settings.members,
                    "Learn from the first so many training members (default all)")
       ->check(ports::between(2u, kMaxMembers));
+  command
+      ->add_option("--pieces", settings.pieces,
+                   "Tokens of a static part's grid, about: a part of the body is one token, or "
+                   "several of a piece each (default 1)")
+      ->check(ports::between(1, 1024));
+  command
+      ->add_option("--mixed", settings.mixed_share,
+                   "Share of a batch that is mixed by part: head, upper and lower body of three "
+                   "members (default 0; needs static parts and --body)")
+      ->check(ports::between(0.0, 1.0));
   command->add_option("--batch", settings.batch, "Members an iteration (default 32)")
       ->check(ports::between(1, 65536));
   command

@@ -29,6 +29,8 @@ nlohmann::json to_json(const SamplerSettings& settings) {
                          {"chunk", settings.space.chunk},
                          {"shape", to_json(settings.shape)},
                          {"members", settings.members},
+                         {"pieces", settings.pieces},
+                         {"mixed_share", settings.mixed_share},
                          {"clean_snr", settings.clean_snr},
                          {"noisy_dimension_snr", settings.noisy_dimension_snr},
                          {"batch", settings.batch},
@@ -61,6 +63,8 @@ SamplerSettings sampler_settings_from_json(const nlohmann::json& json, const std
     settings.space.chunk = json.at("chunk").get<size_t>();
     settings.shape = shape_from_json(json.at("shape"), where);
     settings.members = json.at("members").get<uint32_t>();
+    settings.pieces = json.value("pieces", size_t{1});
+    settings.mixed_share = json.value("mixed_share", 0.0);  // older runs mixed nobody
     settings.clean_snr = json.at("clean_snr").get<double>(),
     settings.noisy_dimension_snr = json.at("noisy_dimension_snr").get<double>();
     settings.batch = json.at("batch").get<uint32_t>(), settings.ema = json.at("ema").get<double>();

@@ -42,6 +42,8 @@ struct SamplerSettings {
   AutoencoderSettings autoencoder;   // of variant `latent` alone
   TransformerShape shape;            // token_sizes follow from the space
   uint32_t members = 0;              // the first so many training members; 0: all
+  size_t pieces = 1;                 // of a static group's grid (measure::WeightLayout)
+  double mixed_share = 0;            // of a batch: people mixed by part (people_mixer.h)
   double clean_snr = 1e4;            // where sampling ends: 40 dB, below the rounding of int8
   double noisy_dimension_snr = 0.1;  // D x SNR where it begins (figurine/detail/noise_level.h)
   uint32_t batch = 32;

@@ -14,6 +14,7 @@
 #include "toolchain/error.h"
 #include "toolchain/generate/autoencoder.h"
 #include "toolchain/generate/flat_trainer.h"
+#include "toolchain/generate/people_mixer.h"
 #include "toolchain/generate/tensors.h"
 #include "toolchain/model/threads.h"
 #include "toolchain/random/counter.h"
@@ -31,7 +32,7 @@ namespace {
 constexpr int kSamplerFormat = 1;
 constexpr int64_t kValidationDraws =
     16;  // noise levels for each validation member, always the same ones
-enum Stream : uint64_t { kLevels = 1, kNoise = 2, kValidationNoise = 3 };
+enum Stream : uint64_t { kLevels = 1, kNoise = 2, kValidationNoise = 3, kMixed = 4 };
 
 struct NoisyBatch {
   torch::Tensor z, lambda, clean;  // [B,D], [B], [B,D]
@@ -50,15 +51,40 @@ NoisyBatch empty_batch(int64_t rows, int64_t size) {
           torch::empty({rows, size})};
 }
 
+// Members, and the people that are mixed of them, as model vectors.
+class LearntPeople {
+ public:
+  // mixer: none where only members are learnt from. Borrowed.
+  LearntPeople(const RowMatrix& training, const ModelSpace& space, const PeopleMixer* mixer)
+      : members_(to_tensor(space.encode(training))), mixer_(mixer) {
+    if (mixer_ == nullptr) return;
+    const PeopleMixer::Parts parts = mixer_->parts(training, space);
+    base_ = to_tensor(parts.base), upper_ = to_tensor(parts.upper), lower_ = to_tensor(parts.lower);
+  }
+
+  int64_t count() const { return members_.size(0); }
+  int64_t size() const { return members_.size(1); }
+  torch::Tensor member(size_t m) const { return members_[static_cast<int64_t>(m)]; }
+  torch::Tensor mixed(size_t m, uint64_t seed, uint64_t counter) const {
+    const MixedPerson person = mixer_->draw(seed, counter, m);
+    return base_[static_cast<int64_t>(person.base)] + upper_[static_cast<int64_t>(person.upper)] +
+           lower_[static_cast<int64_t>(person.lower)];
+  }
+
+ private:
+  torch::Tensor members_, base_, upper_, lower_;  // [N,D] each
+  const PeopleMixer* mixer_;
+};
+
 // The denoiser and the batches that it learns from.
 class Denoising : public FlatModel {
  public:
-  Denoising(const SamplerSettings& settings, size_t dimension, const RowMatrix& training,
+  Denoising(const SamplerSettings& settings, size_t dimension, const LearntPeople& training,
             const RowMatrix& validation)
       : settings_(settings),
         noise_(noise_schedule(settings, dimension)),
-        training_(to_tensor(training)),
-        order_(settings.seed, static_cast<size_t>(training.rows())),
+        training_(training),
+        order_(settings.seed, static_cast<size_t>(training.count())),
         transformer_(settings.shape, settings.seed) {
     make_validation(to_tensor(validation));
   }
@@ -68,7 +94,7 @@ class Denoising : public FlatModel {
   torch::Tensor& gradients() override { return transformer_.gradients(); }
 
   torch::Tensor loss(uint64_t iteration, Share share) override {
-    const int64_t batch = settings_.batch, size = training_.size(1);
+    const int64_t batch = settings_.batch, size = training_.size();
     NoisyBatch noisy = empty_batch(share.count, size);
     for (int64_t row = 0; row < share.count; ++row) {
       const int64_t place = share.first + row;
@@ -77,8 +103,12 @@ class Denoising : public FlatModel {
       const double u = (static_cast<double>(place) + static_cast<double>(random::random_unit(
                                                          settings_.seed, kLevels, counter))) /
                        static_cast<double>(batch);
-      const auto member = static_cast<int64_t>(order_.item(counter));
-      add_noisy(noisy, row, training_[member], draw_noise(settings_.seed, kNoise, counter, size),
+      const size_t member = order_.item(counter);
+      const bool mixed =
+          double{random::random_unit(settings_.seed, kMixed, counter)} < settings_.mixed_share;
+      const torch::Tensor person =
+          mixed ? training_.mixed(member, settings_.seed, counter) : training_.member(member);
+      add_noisy(noisy, row, person, draw_noise(settings_.seed, kNoise, counter, size),
                 noise_.level(u));
     }
     return torch::mse_loss(transformer_.forward(noisy.z, noisy.lambda, settings_.bf16),
@@ -103,7 +133,7 @@ class Denoising : public FlatModel {
 
  private:
   void make_validation(const torch::Tensor& members) {
-    const int64_t size = training_.size(1), count = members.size(0);
+    const int64_t size = training_.size(), count = members.size(0);
     if (count == 0) return;
     validation_ = empty_batch(count * kValidationDraws, size);
     for (int64_t i = 0; i < count * kValidationDraws; ++i) {
@@ -116,7 +146,7 @@ class Denoising : public FlatModel {
 
   SamplerSettings settings_;
   NoiseSchedule noise_;
-  torch::Tensor training_;  // [N,D]
+  LearntPeople training_;
   NoisyBatch validation_;
   random::ShuffledOrder order_;
   Transformer transformer_;
@@ -145,33 +175,45 @@ nlohmann::json describe(const SamplerRequest& request, const SamplerSettings& se
           {"body", request.body}};
 }
 
+// What a population gives to learn from.
 struct Members {
+  std::unique_ptr<measure::WeightLayout> layout;
   RowMatrix training, validation;  // [N,W]
+  std::optional<PeopleMixer> mixer;
 };
 
 // body: a path; not looked at where no member has a static part.
-measure::WeightLayout layout_of(const Population& population, const std::string& path,
-                                const std::string& body) {
-  if (population.static_part.empty())
-    return {population.network, population.shape.size() / population.size()};
-  if (body.empty()) throw InputError(path + ": its members have static parts: say --body");
-  const train::PackageFile opened = train::open_package(body, PackageKind::kBody);
-  if (opened.package.content_hash() != population.body_hash) {
-    throw InputError(body + ": is " + format_hash(opened.package.content_hash()) + ", " + path +
-                     " stands on " + format_hash(population.body_hash));
+Members members_of(const Population& population, const SamplerSettings& settings,
+                   const std::string& path, const std::string& body) {
+  Members members;
+  std::optional<train::PackageFile> opened;
+  if (population.static_part.empty()) {
+    if (settings.mixed_share > 0)
+      throw InputError(path + ": its members have no static values, there is nothing to mix");
+    members.layout = std::make_unique<measure::WeightLayout>(
+        population.network, population.shape.size() / population.size());
+  } else {
+    if (body.empty()) throw InputError(path + ": its members have static parts: say --body");
+    opened.emplace(train::open_package(body, PackageKind::kBody));
+    if (opened->package.content_hash() != population.body_hash) {
+      throw InputError(body + ": is " + format_hash(opened->package.content_hash()) + ", " + path +
+                       " stands on " + format_hash(population.body_hash));
+    }
+    members.layout = std::make_unique<measure::WeightLayout>(population, opened->package.body(),
+                                                             settings.pieces);
   }
-  return {population, opened.package.body()};
-}
-
-Members members_of(const Population& population, const measure::WeightLayout& layout,
-                   const SamplerSettings& settings, const std::string& path) {
-  const RowMatrix weights = layout.read(population);
-  Members members{rows_of(population, weights, Split::kTrain, settings.members),
-                  rows_of(population, weights, Split::kValidation)};
+  const RowMatrix weights = members.layout->read(population);
+  members.training = rows_of(population, weights, Split::kTrain, settings.members);
+  members.validation = rows_of(population, weights, Split::kValidation);
   if (members.training.rows() < 2) throw InputError(path + ": has fewer than two training members");
   if (settings.members > static_cast<uint32_t>(members.training.rows())) {
     throw InputError(path + ": has " + std::to_string(members.training.rows()) +
                      " training members, " + std::to_string(settings.members) + " were asked for");
+  }
+  if (settings.mixed_share > 0) {
+    if (settings.space.variant == Variant::kLatent)
+      throw InputError("variant latent: its space is not linear, nobody can be mixed in it");
+    members.mixer.emplace(members.training, *members.layout, population, opened->package.body());
   }
   return members;
 }
@@ -392,9 +434,11 @@ void train_autoencoder(const std::shared_ptr<Autoencoder>& autoencoder,
   autoencoding.weights().copy_(trainer.average());
 }
 
-ModelSpace make_space(const Members& members, const std::vector<measure::Token>& tokens,
-                      const SamplerSettings& settings, std::shared_ptr<const WeightCodec> codec) {
-  return {members.training, tokens, settings.space, std::move(codec)};
+ModelSpace make_space(const Members& members, const SamplerSettings& settings,
+                      std::shared_ptr<const WeightCodec> codec) {
+  const std::vector<measure::Token>& tokens = members.layout->tokens();
+  if (!members.mixer) return {members.training, tokens, settings.space, std::move(codec)};
+  return {members.mixer->corpus(members.training, settings.seed), tokens, settings.space, nullptr};
 }
 
 }  // namespace
@@ -413,13 +457,11 @@ SamplerResult train_sampler(const SamplerRequest& request) {
   if (plan.finished)
     return group.leads() ? result_of(plan.description) : SamplerResult{.was_finished = true};
   SamplerSettings& settings = plan.settings;
-  const measure::WeightLayout layout = layout_of(
-      population.package.population(), request.population,
-      request.body.empty() && !plan.description.empty() ? plan.description.value("body", "")
-                                                        : request.body);
-  const Members members =
-      members_of(population.package.population(), layout, settings, request.population);
-  const std::vector<measure::Token>& tokens = layout.tokens();
+  const Members members = members_of(population.package.population(), settings, request.population,
+                                     request.body.empty() && !plan.description.empty()
+                                         ? plan.description.value("body", "")
+                                         : request.body);
+  const std::vector<measure::Token>& tokens = members.layout->tokens();
   model::use_threads(settings.threads);
 
   // What can be wrong is found before anything is written: the tokens of `latent` are known before
@@ -430,7 +472,7 @@ SamplerResult train_sampler(const SamplerRequest& request) {
                                                 settings.autoencoder, settings.seed);
   }
   std::optional<ModelSpace> space;
-  if (!autoencoder) space.emplace(make_space(members, tokens, settings, nullptr));
+  if (!autoencoder) space.emplace(make_space(members, settings, nullptr));
   const std::vector<size_t>& token_sizes =
       autoencoder ? autoencoder->token_sizes() : space->token_sizes();
   settings.shape.token_sizes.assign(token_sizes.begin(), token_sizes.end());
@@ -452,10 +494,11 @@ SamplerResult train_sampler(const SamplerRequest& request) {
   }
   if (autoencoder) {
     train_autoencoder(autoencoder, request, settings, members, tokens, group, plan.description);
-    space.emplace(make_space(members, tokens, settings, autoencoder));
+    space.emplace(make_space(members, settings, autoencoder));
   }
 
-  Denoising denoising(settings, dimension, space->encode(members.training),
+  const PeopleMixer* mixer = members.mixer ? &*members.mixer : nullptr;
+  Denoising denoising(settings, dimension, {members.training, *space, mixer},
                       space->encode(members.validation));
   FlatTrainer trainer(denoising, group, training_of(request, settings),
                       [&](const char* status, const FlatProgress& progress) {
@@ -486,9 +529,8 @@ TrainedSampler TrainedSampler::open(const std::string& path, const std::string& 
   sampler.population = std::make_unique<train::PackageFile>(train::open_population(where));
   check_population(description, *sampler.population, run, where);
   const Population& people = sampler.population->package.population();
-  sampler.layout = std::make_unique<measure::WeightLayout>(
-      layout_of(people, where, body.empty() ? description.value("body", "") : body));
-  const Members members = members_of(people, *sampler.layout, sampler.settings, where);
+  Members members = members_of(people, sampler.settings, where,
+                               body.empty() ? description.value("body", "") : body);
   std::shared_ptr<Autoencoder> autoencoder;
   if (sampler.settings.space.variant == Variant::kLatent) {
     autoencoder =
@@ -497,9 +539,9 @@ TrainedSampler TrainedSampler::open(const std::string& path, const std::string& 
     load_parameters(autoencoder_file(run), autoencoder->parameters().layout(),
                     autoencoder->parameters().weights());
   }
-  sampler.space = std::make_unique<ModelSpace>(
-      make_space(members, sampler.layout->tokens(), sampler.settings, autoencoder));
+  sampler.space = std::make_unique<ModelSpace>(make_space(members, sampler.settings, autoencoder));
   sampler.training = sampler.space->encode(members.training);
+  sampler.layout = std::move(members.layout);
   sampler.transformer =
       std::make_unique<Transformer>(sampler.settings.shape, sampler.settings.seed);
   load_parameters(run.weights(), sampler.transformer->layout(), sampler.transformer->weights());

@@ -73,15 +73,17 @@ CapturedPeople::CapturedPeople(const std::string& recipe, const std::string& mak
   makehuman_directory_ = makehuman;
 }
 
-std::vector<Picture> CapturedPeople::photograph(const MemberSet& set, size_t member) const {
-  const population::Identity& identity = identities_[member];
+// shape: what the person must have; empty: whatever it has.
+std::vector<Picture> CapturedPeople::photograph(const MemberSet& set,
+                                                const population::Identity& identity,
+                                                std::span<const float> shape) const {
   const Body& body = set.body->body();
   const capture::PersonRequest request{.seed = capture::person_seed(recipe_.seed, identity.number),
                                        .limits = identity.group->limits};
   const capture::Person person =
       makehuman_ ? capture::make_makehuman_person(request, *makehuman_, makehuman_directory_, body)
                  : capture::make_mannequin_person(request, body);
-  if (!same_shape(person.shape, shape_of(set.population(), member))) {
+  if (!shape.empty() && !same_shape(person.shape, shape)) {
     throw InputError(path_ + ": seed: its identity '" + identity.name() +
                      "' has another shape than the member of population '" + set.population().name +
                      "'");
@@ -107,7 +109,29 @@ People CapturedPeople::draw(const MemberSet& set, std::span<const size_t> member
   set.crew.run("capturing people", members.size(), [&](size_t i) {
     // In a thread of its own: the renderer's way with denormals stays with the thread, and must not
     // change what is measured afterwards.
-    people[i] = std::async(std::launch::async, [&] { return photograph(set, members[i]); }).get();
+    people[i] = std::async(std::launch::async, [&] {
+                  const size_t member = members[i];
+                  return photograph(set, identities_[member], shape_of(set.population(), member));
+                }).get();
+  });
+  return people;
+}
+
+People CapturedPeople::draw_unseen(const MemberSet& set, size_t count) const {
+  const auto group =
+      std::ranges::find(recipe_.groups, Split::kTest, &population::IdentityGroup::split);
+  if (group == recipe_.groups.end())
+    throw InputError(path_ + ": groups: no test people, so nobody knows what others may wear");
+  for (const population::IdentityGroup& named : recipe_.groups) {
+    if (named.first + named.count > kFirstUnseen)
+      throw InputError(path_ + ": groups: identities from " + std::to_string(kFirstUnseen) +
+                       " are those whom the recipe does not name");
+  }
+  People people(count);
+  set.crew.run("capturing unseen people", count, [&](size_t i) {
+    const population::Identity identity{
+        .number = kFirstUnseen + static_cast<uint32_t>(i), .split = Split::kTest, .group = &*group};
+    people[i] = std::async(std::launch::async, [&] { return photograph(set, identity, {}); }).get();
   });
   return people;
 }

@@ -31,9 +31,16 @@ class CapturedPeople {
   // each. About three seconds a person on one core. Throws InputError if a person has another shape
   // than the member, so comes of another seed; Interrupted.
   People draw(const members::MemberSet& set, std::span<const size_t> members) const;
+  // So many people of the recipe's seed whom it does not name, numbered from kFirstUnseen, who may
+  // wear what the recipe's first test people may: references that no avatar was trained for.
+  // InputError where the recipe has no test people.
+  static constexpr uint32_t kFirstUnseen = 900'000;
+  People draw_unseen(const members::MemberSet& set, size_t count) const;
 
  private:
-  std::vector<measure::Picture> photograph(const members::MemberSet& set, size_t member) const;
+  std::vector<measure::Picture> photograph(const members::MemberSet& set,
+                                           const population::Identity& identity,
+                                           std::span<const float> shape) const;
 
   std::string path_, makehuman_directory_;
   population::Recipe recipe_;

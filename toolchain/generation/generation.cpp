@@ -11,7 +11,9 @@
 #include "toolchain/generation/comparison_report.h"
 #include "toolchain/generation/networks.h"
 #include "toolchain/generation/novelty.h"
+#include "toolchain/generation/part_diversity.h"
 #include "toolchain/generation/people_distances.h"
+#include "toolchain/json_number.h"
 #include "toolchain/measure/bootstrap.h"
 #include "toolchain/measure/pooled_errors.h"
 #include "toolchain/measure/sample_metrics.h"
@@ -43,21 +45,47 @@ using train::OpenedMember;
 namespace {
 
 constexpr size_t kMostAveraged = 5;
+constexpr size_t kNamed = 16;        // samples whose nearest member is named
 constexpr size_t kNoisedTried = 12;  // members that the level of noise is matched on
 
-// A person of standardised weights, drawn. All else is the first training member's, which the
-// others share.
-std::vector<Picture> draw_row(const MemberSet& set, const RowVector& z) {
+// The avatar of standardised weights. All else is the first training member's, which the others
+// share.
+template <class Visit>
+void visit_row(const MemberSet& set, const RowVector& z, Visit&& visit) {
   const OpenedMember like(set.population(), set.training.front());
   const RowVector weights = set.standardisation.restore(z);
   WeightStorage storage;
-  return set.draw(set.layout.with(like.avatar, {weights.data(), size_t(weights.size())}, storage));
+  visit(set.layout.with(like.avatar, {weights.data(), size_t(weights.size())}, storage));
+}
+
+std::vector<Picture> draw_row(const MemberSet& set, const RowVector& z) {
+  std::vector<Picture> pictures;
+  visit_row(set, z, [&](const Avatar& avatar) { pictures = set.draw(avatar); });
+  return pictures;
 }
 
 People draw_rows(const MemberSet& set, const std::string& name, const RowMatrix& z) {
   People pictures(static_cast<size_t>(z.rows()));
   set.crew.run("drawing " + name, pictures.size(),
                [&](size_t i) { pictures[i] = draw_row(set, z.row(static_cast<Eigen::Index>(i))); });
+  return pictures;
+}
+
+// Their heads and shoulders.
+People draw_busts(const MemberSet& set, const std::string& name, const RowMatrix& z) {
+  People pictures(static_cast<size_t>(z.rows()));
+  set.crew.run("drawing busts of " + name, pictures.size(), [&](size_t i) {
+    visit_row(set, z.row(static_cast<Eigen::Index>(i)),
+              [&](const Avatar& avatar) { pictures[i] = set.draw_bust(avatar); });
+  });
+  return pictures;
+}
+
+People draw_busts_of(const MemberSet& set, const std::vector<size_t>& members) {
+  People pictures(members.size());
+  set.crew.run("drawing busts of members", pictures.size(), [&](size_t i) {
+    pictures[i] = set.draw_bust(OpenedMember(set.population(), members[i]).avatar);
+  });
   return pictures;
 }
 
@@ -130,8 +158,15 @@ struct References {
   People training, held_out, captures;  // the last may be empty
   RowMatrix training_mse, held_out_mse, captures_mse, training_distances;
   double training_sharpness = 0;
+  // Head and shoulders; nobody's where the body has none.
+  People training_busts, held_out_busts;
+  RowMatrix training_busts_mse, held_out_busts_mse;
+  double bust_sharpness = 0;
+  // The captures of people whom nobody knows.
+  People unseen;
+  RowMatrix unseen_mse;
 
-  References(const MemberSet& set, const People& captured)
+  References(const MemberSet& set, const People& captured, const People& others)
       : training(pictures_of(set, set.training)),
         held_out(pictures_of(set, set.held_out)),
         captures(captured),
@@ -140,7 +175,16 @@ struct References {
         captures_mse(errors_within(set, "captures", captures)),
         training_distances(
             rms_distances(set.training_z, set.training_z, set.standardisation.varying())),
-        training_sharpness(sharpness(training)) {}
+        training_sharpness(sharpness(training)),
+        unseen(others),
+        unseen_mse(errors_within(set, "unseen people", unseen)) {
+    if (!set.has_busts()) return;
+    training_busts = draw_busts_of(set, set.training);
+    held_out_busts = draw_busts_of(set, set.held_out);
+    training_busts_mse = errors_within(set, "training busts", training_busts);
+    held_out_busts_mse = errors_within(set, "held-out busts", held_out_busts);
+    bust_sharpness = sharpness(training_busts);
+  }
 };
 
 // Adds "held_out_captures" to a row: draws of as many of its people as there are captures; nothing
@@ -152,6 +196,48 @@ void compare_with_captures(const MemberSet& set, const References& references,
   row["held_out_captures"] =
       compare(errors_between(set, name + ", captures", people, references.captures), within,
               references.captures_mse, bootstrap);
+}
+
+// Adds "unseen_captures": comparisons with as many of them at a time as there are samples, or with
+// all; "groups": how many of these there are, and means over them.
+void compare_with_unseen(const MemberSet& set, const References& references,
+                         const std::string& name, const People& people, const RowMatrix& within,
+                         const BootstrapOptions& bootstrap, nlohmann::json& row) {
+  const auto all = static_cast<Eigen::Index>(references.unseen.size());
+  if (all < 2) return;
+  const Eigen::Index size = std::min<Eigen::Index>(all, within.rows()), groups = all / size;
+  const RowMatrix errors = errors_between(set, name + ", unseen", people, references.unseen);
+  nlohmann::json means{{"count", groups}};
+  for (Eigen::Index g = 0; g < groups; ++g) {
+    const nlohmann::json one =
+        compare(errors.middleCols(g * size, size), within,
+                references.unseen_mse.block(g * size, g * size, size, size), bootstrap);
+    if (g == 0) row["unseen_captures"] = one;
+    for (const char* key : {"mmd_psnr_db", "coverage_percent", "one_nna_percent"}) {
+      means[key] =
+          means.value(key, 0.0) + number(one.at(key).at("value")) / static_cast<double>(groups);
+    }
+  }
+  row["unseen_captures"]["groups"] = means;
+}
+
+// "bust": the same comparison, copies and sharpness in pictures of head and shoulders.
+nlohmann::json judge_busts(const MemberSet& set, const References& references,
+                           const std::string& name, const People& busts, Eigen::Index learnt,
+                           const BootstrapOptions& bootstrap) {
+  const RowMatrix to_training =
+      errors_between(set, name + ", training busts", busts, references.training_busts);
+  nlohmann::json report{
+      {"novelty",
+       describe(measure_novelty(to_training.leftCols(learnt),
+                                references.training_busts_mse.topLeftCorner(learnt, learnt)))},
+      {"highpass_ratio", sharpness(busts) / references.bust_sharpness}};
+  if (busts.size() >= references.held_out_busts.size()) {
+    report["held_out"] = compare(
+        errors_between(set, name + ", held-out busts", busts, references.held_out_busts),
+        errors_within(set, name + ", busts", busts), references.held_out_busts_mse, bootstrap);
+  }
+  return report;
 }
 
 // How far every held-out member is from who it was learnt from: what a perfect sampler of members
@@ -182,8 +268,11 @@ nlohmann::json audit(const MemberSet& set, const References& references, const R
   of_pictures["median_nearest_db"] =
       finite(psnr_db(of_pictures.at("median_nearest").get<double>()));
   of_pictures["copy_distance_db"] = finite(psnr_db(seen.copy_distance));
+  for (size_t s = 0; s < std::min(kNamed, seen.samples.size()); ++s)
+    of_pictures["nearest"].push_back(set.name(set.training[seen.samples[s].member]));
   return {{"novelty", {{"weights", describe(weights)}, {"pictures", of_pictures}}},
           {"blends", describe(measure_blends(z, learnt_z))},
+          {"by_part", describe_parts(parts_of(set.standardisation.tokens()), z, learnt_z)},
           {"highpass_ratio", sharpness(pictures) / references.training_sharpness}};
 }
 
@@ -210,6 +299,11 @@ nlohmann::json evaluate_row(const MemberSet& set, const References& references,
   row["held_out"] = compare(to_held_out, within, references.held_out_mse, bootstrap);
   row["train"] = compare(to_training, within, references.training_mse, bootstrap);
   compare_with_captures(set, references, generated.name, pictures, within, bootstrap, row);
+  compare_with_unseen(set, references, generated.name, pictures, within, bootstrap, row);
+  if (set.has_busts()) {
+    row["bust"] = judge_busts(set, references, generated.name, draw_busts(set, generated.name, z),
+                              learnt, bootstrap);
+  }
   networks.add_samples(pictures, learnt, row);
   return row;
 }
@@ -286,7 +380,7 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
   }
   FIG_CHECK(options.captures.empty() || options.captures.size() == set.held_out.size(),
             "a capture of every held-out member");
-  const References references(set, options.captures);
+  const References references(set, options.captures, options.unseen);
   const BootstrapOptions bootstrap = bootstrap_of(options);
   const GenerationNetworks networks(options.networks, references.training, references.held_out,
                                     options.threads, bootstrap);
@@ -306,6 +400,12 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
   held_out["samples"] = set.held_out.size();
   compare_with_captures(set, references, "held-out members", references.held_out,
                         references.held_out_mse, bootstrap, held_out);
+  compare_with_unseen(set, references, "held-out members", references.held_out,
+                      references.held_out_mse, bootstrap, held_out);
+  if (set.has_busts()) {
+    held_out["bust"] = judge_busts(set, references, "held-out members", references.held_out_busts,
+                                   set.training_z.rows(), bootstrap);
+  }
   networks.add_held_out_novelty(held_out);
   // Training members as if they had been sampled: what "within 1 dB of training members" is
   // measured from.
@@ -315,6 +415,13 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
                                               references.held_out_mse, bootstrap)}};
   compare_with_captures(set, references, "training members", references.training,
                         references.training_mse, bootstrap, members);
+  compare_with_unseen(set, references, "training members", references.training,
+                      references.training_mse, bootstrap, members);
+  if (set.has_busts()) {
+    members["bust"]["held_out"] = compare(
+        errors_between(set, "training busts", references.training_busts, references.held_out_busts),
+        references.training_busts_mse, references.held_out_busts_mse, bootstrap);
+  }
   networks.add_training_as_samples(members);
   rows.push_back(std::move(members));
   rows.push_back(std::move(held_out));
@@ -324,6 +431,11 @@ nlohmann::json evaluate_generation(const MemberSet& set, const std::vector<Gener
                        {"shots", kComparedShots},
                        {"picture_px", set.picture_px}};
   if (!references.captures.empty()) about["captures"] = describe_captures(references);
+  if (!references.unseen.empty()) {
+    about["unseen"] = {
+        {"kind", "people of the recipe's seed in no part of it, drawn by the captures' renderer"},
+        {"people", references.unseen.size()}};
+  }
   return {{"population", set.population().name},
           {"population_hash", format_hash(set.package->content_hash())},
           {"references", about},

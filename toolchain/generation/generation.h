@@ -37,6 +37,7 @@ struct GenerationOptions {
   uint32_t threads = 1;                  // of the networks
   People captures;  // of the held-out members (captured_people.h), in the set's order, as further
                     // references; or empty
+  People unseen;    // captures of people who are in no part of the population; or empty
 };
 
 // "references": what the sets are; "rows": one for each of the generated, and one of the held-out

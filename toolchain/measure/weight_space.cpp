@@ -7,12 +7,12 @@
 
 #include "figurine/check.h"
 #include "figurine/texel_grid.h"
+#include "toolchain/measure/body_parts.h"
 
 namespace figurine::measure {
 
 namespace {
 
-constexpr uint32_t kPatchesASide = 8, kSmallestPatch = 4;  // cells a side
 constexpr double kRounding =
     1e-10;  // of the largest variance: a Gram matrix of a few hundred rows in double leaves 1e-14
 
@@ -32,21 +32,39 @@ bool is_shared(const RowMatrix& training, Eigen::Index d) {
 
 namespace {
 
-// Squares of cells, row by row; those without a covered cell are none. names: "V.U" of each.
-WeightLayout::Patches cut_into_patches(const TexelGrid& grid, std::vector<std::string>& names) {
-  const uint32_t side = std::max(kSmallestPatch, grid.size / kPatchesASide),
-                 across = (grid.size + side - 1) / side;
-  std::vector<std::vector<uint32_t>> rows(size_t{across} * across);
-  for (uint32_t row = 0; row < grid.cell_count(); ++row) {
-    const uint32_t v = grid.cell[row] / grid.size, u = grid.cell[row] % grid.size;
-    rows[size_t{v / side} * across + u / side].push_back(row);
+// The place of a cell on a curve on which cells that are near each other on the grid mostly are,
+// too (Morton, 1966): the bits of row and column by turns.
+uint64_t z_order(uint32_t v, uint32_t u) {
+  uint64_t place = 0;
+  for (uint32_t bit = 0; bit < 16; ++bit) {
+    place |= uint64_t{v >> bit & 1} << (2 * bit + 1) | uint64_t{u >> bit & 1} << (2 * bit);
   }
+  return place;
+}
+
+// The cells of every part of the body along that curve, cut into pieces of one size, or one more:
+// `pieces` of the grid, and one more for every part that does not fill its last. names:
+// "PART.PIECE" of each.
+WeightLayout::Patches cut_into_patches(const TexelGrid& grid, const Body& body, size_t pieces,
+                                       std::vector<std::string>& names) {
+  const std::vector<BodyPart> of_texel = texel_parts(body);
+  const size_t most = (grid.cell_count() + pieces - 1) / pieces;
   WeightLayout::Patches patches;
-  for (size_t p = 0; p < rows.size(); ++p) {
-    if (rows[p].empty()) continue;
-    patches.row.insert(patches.row.end(), rows[p].begin(), rows[p].end());
-    patches.patch_rows.push_back(static_cast<uint32_t>(rows[p].size()));
-    names.push_back(std::to_string(p / across) + "." + std::to_string(p % across));
+  for (const BodyPart part : kBodyParts) {
+    std::vector<uint32_t> rows;
+    for (uint32_t row = 0; row < grid.cell_count(); ++row) {
+      if (of_texel[grid.source[row]] == part) rows.push_back(row);
+    }
+    std::ranges::sort(rows, {}, [&](uint32_t row) {
+      return z_order(grid.cell[row] / grid.size, grid.cell[row] % grid.size);
+    });
+    const size_t own = (rows.size() + most - 1) / most;
+    for (size_t p = 0; p < own; ++p) {
+      const size_t size = rows.size() * (p + 1) / own - rows.size() * p / own;
+      patches.patch_rows.push_back(static_cast<uint32_t>(size));
+      names.push_back(std::string(to_string(part)) + "." + std::to_string(p));
+    }
+    patches.row.insert(patches.row.end(), rows.begin(), rows.end());
   }
   return patches;
 }
@@ -59,8 +77,9 @@ WeightLayout::WeightLayout(const Network& network, size_t shape_coefficients) {
   end_network();
 }
 
-WeightLayout::WeightLayout(const Population& population, const Body& body)
+WeightLayout::WeightLayout(const Population& population, const Body& body, size_t pieces)
     : own_network_(population.coding != DifferenceCoding::kNone) {
+  FIG_CHECK(pieces >= 1, "a grid in one piece or more");
   if (own_network_) add_network(population.network);
   const size_t shape = population.shape.size() / population.size();
   if (shape > 0) add("shape", shape);
@@ -68,7 +87,7 @@ WeightLayout::WeightLayout(const Population& population, const Body& body)
   for (size_t g = 0; g < population.static_part.groups.size(); ++g) {
     const StaticGroup& group = population.static_part.groups[g];
     std::vector<std::string> names;
-    Patches patches = cut_into_patches(make_texel_grid(body, group.grid_size), names);
+    Patches patches = cut_into_patches(make_texel_grid(body, group.grid_size), body, pieces, names);
     FIG_CHECK(patches.row.size() * group.channels == group.values.size(),
               "a row of static values for every cell");
     add_group(g, group.channels, std::move(patches), names);

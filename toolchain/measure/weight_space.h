@@ -7,11 +7,15 @@
 // directions of a basis.
 //
 // One token a convolution, as the paper has them: its kernel [out,k,k,in] (OHWI), then its bias
-// [out]; one for the shape coefficients; one for every patch of a static group's grid, an eighth of
-// its side, with all of its channels. Standardised values are z = (w - mean) / scale with
-// the mean of every value and one scale a token, its root mean square deviation over the values
-// that vary. A value that all training members share (a dead channel's) has no deviation to be
-// measured in: z leaves it out as 0, and what is restored from z gets the shared value.
+// [out]; one for the shape coefficients; one for every patch of a static group's grid, with all of
+// its channels. A patch has cells of one part of the body alone (body_parts.h), so that whoever
+// wears another's jacket has that one's tokens: the part's cells along a Z-order curve over the
+// grid, in one piece or, for comparison, cut into several. The order of the values is the same
+// however many there are. Standardised values are z =
+// (w - mean) / scale with the mean of every value and one scale a token, its root mean square
+// deviation over the values that vary. A value that all training members share (a dead channel's)
+// has no deviation to be measured in: z leaves it out as 0, and what is restored from z gets the
+// shared value.
 #pragma once
 
 #include <Eigen/Dense>
@@ -32,7 +36,7 @@ using RowVector = Eigen::RowVectorXd;
 // A stretch of a member's vector.
 struct Token {
   std::string name;  // "layer.N" by the order of the convolutions, as a run's weights are called;
-                     // "shape"; "static.G.V.U": patch in row V, column U of group G's grid
+                     // "shape"; "static.G.PART.P": piece P of a part in group G
   size_t begin = 0, size = 0;
 };
 
@@ -49,8 +53,9 @@ class WeightLayout {
  public:
   // Avatars of this network without a static part. No coefficients: no token of the shape.
   WeightLayout(const Network& network, size_t shape_coefficients);
-  // A population's members, on a body that they fit (check_avatar_fits_body).
-  WeightLayout(const Population& population, const Body& body);
+  // A population's members, on a body that they fit (check_avatar_fits_body). pieces: of a static
+  // group's grid; a part of the body has one at least (1: just one).
+  WeightLayout(const Population& population, const Body& body, size_t pieces = 1);
   // A sampler's avatars.
   explicit WeightLayout(const Sampler& sampler);
 

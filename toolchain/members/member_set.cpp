@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "toolchain/error.h"
-#include "toolchain/pictures/body_parts.h"
+#include "toolchain/measure/body_parts.h"
 #include "toolchain/train/opened_member.h"
 
 namespace figurine::members {
@@ -37,7 +37,7 @@ std::vector<Shot> make_shots(const Body& body) {
   }
   shots.push_back({0, 20, 5, Subject::kGrounded});
   shots.push_back({0, 200, 5, Subject::kGrounded});
-  if (!pictures::bust_texels(body).empty()) shots.push_back({0, 20, 5, Subject::kBust});
+  if (!measure::bust_texels(body).empty()) shots.push_back({0, 20, 5, Subject::kBust});
   return shots;
 }
 
@@ -139,11 +139,9 @@ void MemberSet::frame_shots() {
     const Extent all = hold(seen, shot == kBustPortrait ? kFramedBusts : 1);
     if (!(all.right > all.left && all.bottom > all.top))
       throw InputError("population '" + population().name + "': its members cannot be seen");
-    if (shot < kComparedShots) {
+    if (shot < kComparedShots || shot == kBustPortrait)
       renderer.frame(shot, all, picture_px, picture_px, kPictureMargin);
-    } else {
-      portrait_extent(shot).add(all);
-    }
+    if (shot >= kComparedShots) portrait_extent(shot).add(all);
   }
 }
 

@@ -17,7 +17,8 @@ struct MemberSetOptions {
   bool quiet = false;
 };
 
-// The pictures that everything is compared by come first; portraits are for people to look at.
+// The pictures that everything is compared by come first; portraits are for people to look at, and
+// those of busts are compared by themselves.
 inline constexpr size_t kComparedShots = 6;  // two poses from three sides
 // Grounded: from the front, slightly turned, and from behind; head and shoulders from the front, on
 // bodies with a head.
@@ -34,6 +35,10 @@ struct MemberSet {
   const std::string& name(size_t member) const { return population().members[member].name; }
   std::vector<measure::Picture> draw(const Avatar& avatar) const {
     return renderer.draw(avatar, 0, kComparedShots);
+  }
+  // Head and shoulders from the front, to be compared; has_busts must be true.
+  std::vector<measure::Picture> draw_bust(const Avatar& avatar) const {
+    return renderer.draw(avatar, kBustPortrait, kBustPortrait + 1);
   }
   bool has_busts() const { return renderer.shots().size() > kBustPortrait; }
   // One person to look at, a cell of `height_px`; all cells of a height and of whole people, or of

@@ -197,7 +197,7 @@ ports::ImageU8 draw_mixtures(const MemberSet& set, const std::vector<MixedPair>&
   return tile(rows);
 }
 
-ports::ImageU8 draw_part_mixtures(const MemberSet& set, const PartExchange& parts,
+ports::ImageU8 draw_part_mixtures(const MemberSet& set, const measure::PartExchange& parts,
                                   const std::vector<MixedPair>& pairs) {
   constexpr size_t kColumns = std::size(kPartRows), kEnds = 2;
   const uint32_t height = heights_for(set.population()).mixture_px;
@@ -218,7 +218,7 @@ ports::ImageU8 draw_part_mixtures(const MemberSet& set, const PartExchange& part
     paste(cells[i], sheet, column * width + (column < kEnds ? 0 : kSeparator_px),
           uint32_t(i / kColumns) * height);
   }
-  draw_line(sheet, {kEnds * width + kSeparator_px / 2, 0, 1, sheet.height_px});
+  draw_line(sheet, {uint32_t(kEnds) * width + kSeparator_px / 2, 0, 1, sheet.height_px});
   return sheet;
 }
 

@@ -22,7 +22,7 @@ ports::ImageU8 draw_bust_wall(const MemberSet& set);
 ports::ImageU8 draw_mixtures(const MemberSet& set, const std::vector<MixedPair>& pairs);
 // A row for each pair: the two, a thin line, and the first with the second's head, upper body and
 // lower body. The parts are the set's body's.
-ports::ImageU8 draw_part_mixtures(const MemberSet& set, const PartExchange& parts,
+ports::ImageU8 draw_part_mixtures(const MemberSet& set, const measure::PartExchange& parts,
                                   const std::vector<MixedPair>& pairs);
 // The given members in their order, each from the front and from behind.
 ports::ImageU8 draw_close(const MemberSet& set, const std::vector<size_t>& members);

@@ -274,8 +274,8 @@ std::vector<MixedPair> choose_pairs(const MemberDistances& distances) {
 }
 
 nlohmann::json evaluate_members(const MemberSet& set, const MemberDistances& distances,
-                                const std::vector<MixedPair>& pairs, const PartExchange* parts,
-                                const MembersOptions& options) {
+                                const std::vector<MixedPair>& pairs,
+                                const measure::PartExchange* parts, const MembersOptions& options) {
   const Population& population = set.population();
   nlohmann::json counts;
   for (const Split split : kSplits) {

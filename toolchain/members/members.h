@@ -44,7 +44,7 @@ struct MembersOptions {
 // {"8": 21.5, ...}; null without held-out members. parts: null where members cannot be mixed by
 // part; then "part_mixtures" is null.
 nlohmann::json evaluate_members(const MemberSet& set, const MemberDistances& distances,
-                                const std::vector<MixedPair>& pairs, const PartExchange* parts,
-                                const MembersOptions& options);
+                                const std::vector<MixedPair>& pairs,
+                                const measure::PartExchange* parts, const MembersOptions& options);
 
 }  // namespace figurine::members

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "toolchain/pictures/body_parts.h"
+#include "toolchain/measure/body_parts.h"
 
 namespace figurine::pictures {
 
@@ -54,7 +54,8 @@ Box projected_box(const train::AvatarModel& model, const train::PosedBody& posed
   const model::HeadFrame head = model.head_frame(posed);
   float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
   for (uint32_t i = 0; i < body.texel_count(); ++i) {
-    if (std::find(joints.begin(), joints.end(), strongest_joint(body, i)) == joints.end()) continue;
+    if (std::find(joints.begin(), joints.end(), measure::strongest_joint(body, i)) == joints.end())
+      continue;
     const Affine transform =
         blend(posed.world_from_rest, &body.texel_joints[size_t(i) * kSkinInfluences],
               &body.texel_weights[size_t(i) * kSkinInfluences]);

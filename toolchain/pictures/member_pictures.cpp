@@ -7,8 +7,8 @@
 
 #include "figurine/check.h"
 #include "toolchain/error.h"
+#include "toolchain/measure/body_parts.h"
 #include "toolchain/model/parallel.h"
-#include "toolchain/pictures/body_parts.h"
 #include "toolchain/train/progress.h"
 #include "toolchain/verify/device_avatar.h"
 
@@ -111,7 +111,7 @@ void Extent::add(const Extent& other) {
 ShotRenderer::ShotRenderer(const Package& body, std::vector<train::OwnedPose> poses,
                            std::vector<Shot> shots)
     : body_(&body),
-      bust_(bust_texels(body.body())),
+      bust_(measure::bust_texels(body.body())),
       poses_(std::move(poses)),
       shots_(std::move(shots)) {
   const bool busts = std::ranges::find(shots_, Subject::kBust, &Shot::subject) != shots_.end();

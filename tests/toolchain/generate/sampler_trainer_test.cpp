@@ -12,6 +12,7 @@
 
 #include "ports/host/folder_lock.h"
 #include "tests/toolchain/generate/small_people.h"
+#include "tests/toolchain/members/small_members.h"
 #include "toolchain/error.h"
 #include "toolchain/model/threads.h"
 #include "toolchain/tensor_operations.h"
@@ -161,6 +162,39 @@ TEST_F(SamplerTraining, GoesOnWithTheSameBitsFromTheAutoencoder) {
   EXPECT_TRUE(back.array().isFinite().all());
   fs::remove(path("cut") + "/autoencoder.safetensors");
   EXPECT_THROW(TrainedSampler::open(path("cut")), InputError);
+}
+
+// Mixed people are as reproducible as members, and are something else to learn from.
+TEST_F(SamplerTraining, GoesOnWithTheSameBitsOnMixedPeople) {
+  const tests::SmallMembers people({.own_networks = false});
+  ASSERT_TRUE(ports::write_file_atomically(path("mixed.fgn"), people.bytes.bytes()).ok());
+  ASSERT_TRUE(ports::write_file_atomically(path("body.fgn"), people.body.bytes.bytes()).ok());
+  const auto mixing = [&](const std::string& run, double share, size_t pieces = 1) {
+    SamplerRequest request = this->request(run);
+    request.population = path("mixed.fgn"), request.body = path("body.fgn");
+    request.settings.mixed_share = share, request.settings.pieces = pieces;
+    return request;
+  };
+  train_sampler(mixing("whole", 0.8));
+  SamplerRequest cut = mixing("cut", 0.8);
+  cut.stop_after = 31;
+  EXPECT_THROW(train_sampler(cut), train::Interrupted);
+  cut.resume = true, cut.stop_after = 0;
+  train_sampler(cut);
+  EXPECT_EQ(weights("cut"), weights("whole"));
+  train_sampler(mixing("members", 0));
+  EXPECT_NE(weights("members"), weights("whole"));
+  train_sampler(mixing("pieces", 0.8, 12));
+  const TrainedSampler one = TrainedSampler::open(path("whole")),
+                       many = TrainedSampler::open(path("pieces"));
+  EXPECT_GT(many.space->token_sizes().size(), one.space->token_sizes().size() + 6);
+  EXPECT_EQ(one.training.rows(), 5) << "mixed people are no members";
+  SamplerRequest latent = mixing("latent", 0.5);
+  latent.settings.space.variant = Variant::kLatent;
+  EXPECT_NE(refusal(latent).find("nobody can be mixed"), std::string::npos);
+  SamplerRequest mapless = request("mapless");
+  mapless.settings.mixed_share = 0.5;
+  EXPECT_NE(refusal(mapless).find("no static values"), std::string::npos);
 }
 
 TEST_F(SamplerTraining, NeverLooksAtTheTestPart) {

@@ -11,6 +11,7 @@
 #include "figurine/texel_grid.h"
 #include "formats/writer/population_writer.h"
 #include "runtime/test_packages.h"
+#include "toolchain/measure/body_parts.h"
 
 namespace figurine::measure::weight_space_test {
 namespace {
@@ -214,13 +215,30 @@ TEST(WeightSpace, OfOneNetworkAVectorIsShapeAndMapPatchByPatch) {
   for (size_t i = 0; i < own.size(); ++i) squares += std::pow(double{scale[i % 3]} * own[i], 2);
   const auto map = all.row(1).tail(static_cast<Eigen::Index>(own.size()));
   EXPECT_NEAR(map.squaredNorm(), squares, 1e-9 * squares);
-  // The first cell lies in the patch that its row and column say.
-  const uint32_t patch = std::max(4u, side / 8), v = grid.cell[0] / side, u = grid.cell[0] % side;
-  const std::string name =
-      "static.0." + std::to_string(v / patch) + "." + std::to_string(u / patch);
-  const auto token = std::ranges::find(layout.tokens(), name, &Token::name);
-  ASSERT_NE(token, layout.tokens().end());
-  EXPECT_EQ(all(1, Eigen::Index(token->begin)), double{scale[0]} * own[0]);
+  // Of several pieces: the same values in the same order, in more tokens.
+  const WeightLayout pieces(package->population(), body.package->body(), 12);
+  EXPECT_GE(pieces.tokens().size(), 1u + 12);
+  EXPECT_GT(pieces.tokens().size(), layout.tokens().size());
+  EXPECT_EQ(pieces.patches()[0].row, layout.patches()[0].row);
+  EXPECT_EQ(pieces.read(package->population()), all);
+  // A patch has cells of one part, which its name says; all are there once, in the patches' order.
+  const std::vector<BodyPart> of_texel = texel_parts(body.package->body());
+  const WeightLayout::Patches& patches = layout.patches()[0];
+  std::vector<uint32_t> sorted = patches.row;
+  std::ranges::sort(sorted);
+  for (uint32_t i = 0; i < cells; ++i) ASSERT_EQ(sorted[i], i);
+  size_t cell = 0;
+  for (size_t p = 0; p < patches.patch_rows.size(); ++p) {
+    const Token& token = layout.tokens()[layout.map().first + p];
+    EXPECT_EQ(token.size, size_t{patches.patch_rows[p]} * 3);
+    for (uint32_t k = 0; k < patches.patch_rows[p]; ++k, ++cell) {
+      const uint32_t row = patches.row[cell];
+      EXPECT_TRUE(
+          token.name.starts_with(std::string("static.0.") + to_string(of_texel[grid.source[row]])))
+          << token.name;
+      EXPECT_EQ(all(1, Eigen::Index(token.begin + 3 * k)), double{scale[0]} * own[3 * row]);
+    }
+  }
   // Back to an avatar: the network untouched, the map to within half a step of its largest value.
   WeightStorage storage;
   const std::vector<double> row(&all(1, 0), &all(1, 0) + layout.size());

@@ -15,7 +15,8 @@
 namespace figurine::members::part_mixtures_test {
 namespace {
 
-using pictures::BodyPart;
+using measure::BodyPart;
+using measure::PartExchange;
 using tests::SmallMembers;
 using train::OpenedMember;
 
@@ -35,7 +36,7 @@ TEST(PartExchange, SharesFollowFromTheNearestTexelOfTheOtherSide) {
   const Population& population = people.package->population();
   const Body& body = people.body.body();
   const PartExchange parts(population, body);
-  const std::vector<BodyPart> of_texel = pictures::texel_parts(body);
+  const std::vector<BodyPart> of_texel = measure::texel_parts(body);
   size_t soft = 0;
   for (const BodyPart part : kParts) {
     EXPECT_EQ(parts.texels(part), size_t(std::ranges::count(of_texel, part)));
@@ -126,7 +127,7 @@ TEST(PartMixtures, NeedMapsAndABodyWithParts) {
   const SmallMembers without({.maps = false}), cylinder({.joint_names = {}}),
       headless({.joint_names = {"pelvis", "spine1", "spine2", "spine3"}}), good({});
   const auto obstacle = [](const SmallMembers& people) {
-    return part_mixture_obstacle(people.package->population(), people.body.body());
+    return measure::part_mixture_obstacle(people.package->population(), people.body.body());
   };
   EXPECT_NE(obstacle(without).find("have no static values"), std::string::npos);
   EXPECT_NE(obstacle(cylinder).find("joint called like head"), std::string::npos);

@@ -1,9 +1,9 @@
-#include "toolchain/pictures/body_parts.h"
+#include "toolchain/measure/body_parts.h"
 
 #include <algorithm>
 #include <array>
 
-namespace figurine::pictures {
+namespace figurine::measure {
 
 namespace {
 
@@ -41,6 +41,11 @@ std::string_view without_side(std::string_view name) {
 }
 
 }  // namespace
+
+const char* to_string(BodyPart part) {
+  constexpr std::array kNames{"head", "upper_body", "lower_body", "hands", "other"};
+  return kNames[static_cast<size_t>(part)];
+}
 
 uint8_t strongest_joint(const Body& body, uint32_t texel) {
   const float* weights = &body.texel_weights[size_t{texel} * kSkinInfluences];
@@ -88,4 +93,4 @@ std::vector<uint32_t> bust_texels(const Body& body) {
   return texels;
 }
 
-}  // namespace figurine::pictures
+}  // namespace figurine::measure

@@ -1,5 +1,5 @@
 // Parts of a body by its joints' names: on the mannequin they are where a person has them.
-#include "toolchain/pictures/body_parts.h"
+#include "toolchain/measure/body_parts.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "toolchain/body/skeleton.h"
 #include "toolchain/body/texel_body.h"
 
-namespace figurine::pictures::body_parts_test {
+namespace figurine::measure::body_parts_test {
 namespace {
 
 TEST(BodyParts, OfTheMannequinLieWhereAPersonHasThem) {
@@ -69,4 +69,4 @@ TEST(BodyParts, WithoutKnownNamesThereIsNoPartAndNoBust) {
 }
 
 }  // namespace
-}  // namespace figurine::pictures::body_parts_test
+}  // namespace figurine::measure::body_parts_test

@@ -3,6 +3,7 @@
 // whatever its mesh.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -12,7 +13,7 @@
 
 #include "figurine/body.h"
 
-namespace figurine::pictures {
+namespace figurine::measure {
 
 // The joint with a texel's largest skin weight, of equals the first.
 uint8_t strongest_joint(const Body& body, uint32_t texel);
@@ -20,6 +21,9 @@ uint8_t strongest_joint(const Body& body, uint32_t texel);
 // Hands are a part of their own: who puts on a jacket keeps the hands. kOther: of no joint with a
 // known name and no such parent.
 enum class BodyPart : uint8_t { kHead, kUpperBody, kLowerBody, kHands, kOther };
+inline constexpr std::array kBodyParts{BodyPart::kHead, BodyPart::kUpperBody, BodyPart::kLowerBody,
+                                       BodyPart::kHands, BodyPart::kOther};
+const char* to_string(BodyPart part);  // "head", "upper_body", "lower_body", "hands", "other"
 
 // [J] by name: neck, head, jaw and eyes; spine, collars, shoulders and elbows; pelvis, hips, knees,
 // ankles and feet; wrists. A joint of another name goes with its parent (fingers, toes, hair).
@@ -32,4 +36,4 @@ std::vector<BodyPart> texel_parts(const Body& body);
 // None where the body has no joint called "head".
 std::vector<uint32_t> bust_texels(const Body& body);
 
-}  // namespace figurine::pictures
+}  // namespace figurine::measure
