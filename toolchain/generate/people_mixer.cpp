@@ -133,8 +133,7 @@ PeopleMixer::Parts PeopleMixer::parts(const RowMatrix& training, const ModelSpac
   const auto encoded = [&](const RowVector& share) {
     RowMatrix rows = training;
     for (Eigen::Index i = 0; i < rows.rows(); ++i)
-      rows.row(i) =
-          (mean.array() + share.array() * (training.row(i) - mean).array()).matrix();
+      rows.row(i) = (mean.array() + share.array() * (training.row(i) - mean).array()).matrix();
     return space.encode(rows);
   };
   const RowVector base = (1 - upper_.array() - lower_.array()).matrix();

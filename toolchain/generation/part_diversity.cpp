@@ -97,9 +97,8 @@ nlohmann::json describe_parts(const std::vector<PartStretch>& parts, const RowMa
     combinations.insert(nearest[s]);
   }
   const auto share = [&](size_t some) { return double(some) / double(count); };
-  return {{"parts", rows},
-          {"mixed_share", share(mixed)},
-          {"combinations", share(combinations.size())}};
+  return {
+      {"parts", rows}, {"mixed_share", share(mixed)}, {"combinations", share(combinations.size())}};
 }
 
 }  // namespace figurine::generation

@@ -1,5 +1,5 @@
-// People mixed by part: whose cells are whose, who may give clothes to whom, and that a linear space
-// sees the same person in three pieces as in one.
+// People mixed by part: whose cells are whose, who may give clothes to whom, and that a linear
+// space sees the same person in three pieces as in one.
 #include "toolchain/generate/people_mixer.h"
 
 #include <gtest/gtest.h>
@@ -42,8 +42,8 @@ TEST(PeopleMixer, TakesEveryPartFromItsDonor) {
   std::array<size_t, 3> count{};  // values that are mostly of the base, the upper, the lower body
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     const auto own = [&](size_t member) { return mixed.training(Eigen::Index(member), i); };
-    ASSERT_NEAR(values[i],
-                own(0) + upper[i] * (own(3) - own(0)) + lower[i] * (own(4) - own(0)), 1e-12);
+    ASSERT_NEAR(values[i], own(0) + upper[i] * (own(3) - own(0)) + lower[i] * (own(4) - own(0)),
+                1e-12);
     ++count[upper[i] > 0.5 ? 1 : lower[i] > 0.5 ? 2 : 0];
   }
   for (const size_t some : count) EXPECT_GT(some, 2u);

@@ -16,9 +16,12 @@ using measure::Token;
 constexpr Eigen::Index kMembers = 40, kSize = 24;
 
 const std::vector<Token>& tokens() {
-  static const std::vector<Token> all{{"layer.0", 0, 4},           {"shape", 4, 4},
-                                      {"static.0.head.0", 8, 4},   {"static.0.upper_body.0", 12, 4},
-                                      {"static.0.upper_body.1", 16, 4}, {"static.1.head.0", 20, 4}};
+  static const std::vector<Token> all{{"layer.0", 0, 4},
+                                      {"shape", 4, 4},
+                                      {"static.0.head.0", 8, 4},
+                                      {"static.0.upper_body.0", 12, 4},
+                                      {"static.0.upper_body.1", 16, 4},
+                                      {"static.1.head.0", 20, 4}};
   return all;
 }
 
