@@ -26,7 +26,15 @@ train evaluate members "$state/population.fgn" --body "$state/body.fgn" "${pictu
   -o "$state/report.json"
 scripts/run python3 scripts/experiments/population_report.py "$state" "$name" \
   docs/results/population.json "scripts/experiments/population.sh $name"
-# The ten worst on held-out poses, worst first: truth left, avatar right in every pair.
+# The ten worst on held-out poses, worst first: truth left, avatar right in every pair; where a
+# member came without its pictures, all of them as avatars alone, from the front and from behind.
+while read -r identity; do
+  [ -r "$state/members/$identity.jpg" ] || {
+    train evaluate members "$state/population.fgn" --body "$state/body.fgn" --quiet \
+      --worst-sheet "docs/population_worst_$name.jpg"
+    exit
+  }
+done < "$state/worst.txt"
 worst=()
 while read -r identity; do worst+=(-i "$state/members/$identity.jpg"); done < "$state/worst.txt"
 shape='scale=480:320:force_original_aspect_ratio=decrease,pad=480:320:0:0:0x808080,setsar=1'

@@ -9,6 +9,7 @@
 #include "figurine/package.h"
 #include "runtime/sample/random_sampler.h"
 #include "runtime/src/sample/device_transformer.h"
+#include "runtime/src/sample/weight_decoder.h"
 #include "tests/stability/rows.h"
 #include "tests/stability/scene.h"
 
@@ -126,10 +127,52 @@ Rows outliers_among_activations() {
   return rows;
 }
 
+// A map whose sampled values lie far outside of what training members have, or are next to nothing,
+// in scales from the smallest to huge: integers stay within 127 of either sign, where clamped and
+// rounded doubles would be, and a value of nothing is nothing.
+Rows maps_of_extreme_values() {
+  constexpr float kValues[] = {0,     -0.0f, 1e-45f, -1e-38f, 1e-6f, 0.5f,
+                               -1.0f, 127,   -1e4f,  3e38f,   -3e38f};
+  const std::vector<float> scales{std::numeric_limits<float>::min(), 1e-6f, 0.01f, 1e30f};
+  const std::vector<uint32_t> row{2, 0, 1};
+  Sampler sampler;
+  sampler.static_groups.push_back({.first_channel = 0,
+                                   .channels = static_cast<uint32_t>(scales.size()),
+                                   .grid_size = 2,
+                                   .scale = scales,
+                                   .row = row,
+                                   .patch_rows = {2, 1}});
+  size_t outside = 0, wrong = 0, misplaced = 0;
+  std::vector<int8_t> integers;
+  for (const float value : kValues) {
+    const std::vector<float> patches(row.size() * scales.size(), value);
+    const StaticPart part = decode_static_part(sampler, patches, integers);
+    for (size_t i = 0; i < integers.size(); ++i) {
+      const double exact = double{value} / double{scales[i % scales.size()]};
+      outside += std::abs(int{integers[i]}) > 127;
+      wrong += std::abs(std::clamp(exact, -127.0, 127.0) - integers[i]) > 0.5 + 1e-5;
+    }
+    misplaced += part.groups[0].values.size() != integers.size();
+  }
+  // Every cell where its row says: patches count up, one value a cell.
+  std::vector<float> counted;
+  for (size_t k = 0; k < row.size(); ++k) counted.insert(counted.end(), scales.size(), 0.01f * k);
+  decode_static_part(sampler, counted, integers);
+  for (size_t k = 0; k < row.size(); ++k)
+    misplaced += integers[size_t{row[k]} * scales.size() + 2] != static_cast<int>(k);
+  return {{"maps of values from 1e-45 to 3e38", "integers outside of 127 of either sign",
+           Bound::kAtMost, 0, double(outside)},
+          {"maps of values from 1e-45 to 3e38", "integers that are not the nearest within range",
+           Bound::kAtMost, 0, double(wrong)},
+          {"maps of values from 1e-45 to 3e38", "cells elsewhere than their row says",
+           Bound::kAtMost, 0, double(misplaced)}};
+}
+
 constexpr Case kCases[] = {{"SamplerRequests", every_request},
                            {"SamplerOutOfScale", denoisers_out_of_scale},
                            {"SamplerOverflow", denoisers_that_overflow},
-                           {"SamplerOutliers", outliers_among_activations}};
+                           {"SamplerOutliers", outliers_among_activations},
+                           {"SampledMaps", maps_of_extreme_values}};
 
 }  // namespace
 }  // namespace sampler
