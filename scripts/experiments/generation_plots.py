@@ -19,7 +19,8 @@ import matplotlib.pyplot as plot
 
 import results
 
-COLOURS = {"layer": "#1f77b4", "flat": "#ff7f0e", "latent": "#2ca02c", "basis": "#d62728"}
+COLOURS = {"layer": "#1f77b4", "flat": "#ff7f0e", "latent": "#2ca02c", "basis": "#d62728",
+           "shipped": "#d62728", "alone": "#9467bd"}
 
 
 def variant_of(run):

@@ -5,64 +5,89 @@
 #   scripts/experiments/sampler.sh edge [FOLDER]
 #
 # FOLDER (default out/sampler) keeps every step.
-# May be stopped and killed at any time; called again it goes on. Trains `basis`, which ships (3,000
-# iterations, 15 minutes of a core), and `layer`, the paper's, for the table. Writes
-# samples/samplers/edge.fgn, the pictures docs/sampler_{edge,trace_edge,rows_edge}.jpg,
-# docs/results/sampling.json, docs/results/sampler_loss_edge.csv and, under the population's name,
-# docs/results/generation.json.
+# May be stopped and killed at any time; called again it goes on. Trains `shipped` (basis, people
+# mixed by part, as long as scripts/experiments/copies.sh chose; minutes of a core), and for the
+# table `alone`, the same from members alone, and `layer`, the paper's tokens. Writes
+# samples/samplers/edge.fgn, the pictures docs/sampler_{edge,bust_edge,trace_edge,rows_edge,
+# nearest_edge}.jpg, docs/results/sampling.json, docs/results/sampler_loss_edge.csv and, under the
+# population's name and under "shipped", docs/results/generation.json.
 #
-# Environment: MINUTES (60) of a core for `layer`; SHIPPED (empty): if set, `basis` is not trained
-# anew, the package that ships is judged, and samples/samplers/edge.fgn and
+# Environment: ITERATIONS (8000) of `shipped`; MINUTES (60; 0: none) for `layer`;
+# UNSEEN (200) people captured for the table; SHIPPED (empty): if set, nothing is trained but
+# `alone` and `layer`, the package that ships is judged, and samples/samplers/edge.fgn and
 # docs/results/sampling.json stay as they are.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
 
-name=${1:?edge} folder=${2:-out/sampler} minutes=${MINUTES:-60}
-population=samples/populations/$name.fgn body=samples/populations/${name}_body.fgn \
-  features=samples/populations/edge_features.safetensors
-for file in "$population" "$body" "$features"; do
+name=${1:?edge} folder=${2:-out/sampler} minutes=${MINUTES:-60} iterations=${ITERATIONS:-8000}
+unseen=${UNSEEN:-200}
+population=samples/populations/$name body=samples/populations/$name/body.fgn \
+  features=samples/populations/${name}_features.safetensors
+for file in "$population/split.json" "$body" "$features"; do
   [ -r "$file" ] || die "sampler: $file: no such file"
 done
 programs=(figurine)
 . scripts/experiments/tools.sh
 mkdir -p samples/samplers
-export FIGURINE_PATH=samples/populations
+export FIGURINE_PATH=samples/populations/$name
 
-common=(--size device --blocks 6 --bf16)
 package=samples/samplers/$name.fgn
 judge() {
-  train evaluate generation --population "$population" --body "$body" --features "$features" \
-    --recipe "toolchain/population/$name.json" "$@"
+  train evaluate generation --population "$population" --body "$body" --features "$features" "$@"
 }
-learn "$folder/layer" --variant layer --learning-rate 2e-4 --minutes "$minutes" "${common[@]}"
+basis=(--variant basis --rank 90 --size device --blocks 4 --bf16 --learning-rate 5e-4
+  --body "$body")
+learn "$folder/alone" "${basis[@]}" --iterations 4000
+[ "$minutes" = 0 ] || learn "$folder/layer" --variant layer --size device --blocks 6 --bf16 \
+  --learning-rate 2e-4 --minutes "$minutes" --body "$body"
 if [ -z "${SHIPPED:-}" ]; then
-  learn "$folder/basis" --variant basis --rank 32 --learning-rate 5e-4 --iterations 3000 \
-    "${common[@]}"
+  learn "$folder/shipped" "${basis[@]}" --iterations "$iterations" --mixed 1
   step "packing"
-  judge --run "basis=$folder/basis" -o "$folder/generation_basis.json"
-  train pack "$folder/basis" --body "$body" --population-file "$population" --name "$name" \
-    --report "$folder/generation_basis.json" -o "$folder/sampler.fgn"
+  judge --run "shipped=$folder/shipped" --no-baselines -o "$folder/generation_shipped.json"
+  train pack "$folder/shipped" --body "$body" --population-file "$population" --name "$name" \
+    --report "$folder/generation_shipped.json" -o "$folder/sampler.fgn"
   step "error against evaluations"
-  train evaluate sampling --run "$folder/basis" --population "$population" \
+  train evaluate sampling --run "$folder/shipped" --population "$population" \
     --sampler "$folder/sampler.fgn" --body "$body" -o "$folder/sampling.json"
   install -m 644 "$folder/sampler.fgn" "$package"
 fi
 step "evaluating"
-judge --sampler "basis=$package" --run "layer=$folder/layer" -o "$folder/generation.json"
-train evaluate generation --population "$population" --body "$body" --no-baselines --replicates 10 \
-  --sampler "basis=$package" --run "layer=$folder/layer" \
-  --sheet "docs/sampler_rows_$name.jpg"
+runs=(--sampler "shipped=$package" --run "alone=$folder/alone")
+[ ! -e "$folder/layer/run.json" ] || runs+=(--run "layer=$folder/layer")
+judge "${runs[@]}" --recipe "toolchain/population/$name.json" --unseen "$unseen" \
+  -o "$folder/generation.json"
+train evaluate generation --population "$population" --body "$body" --no-baselines \
+  --replicates 10 "${runs[@]}" --sheet "docs/sampler_rows_$name.jpg"
 
-# 64 seeds, counted up from 0, none left out.
+# 64 seeds, counted up from 0, none left out; the first half's heads and shoulders.
+step "drawing"
 mkdir -p "$folder/people"
 for seed in $(seq 0 63); do
   picture=$folder/people/$(printf %02d "$seed")
   device sample "$package" --seed "$seed" -o "$picture.fgn" 2> /dev/null
   device render "$picture.fgn" --size 256x256 --background grey -o "$picture.png"
+  [ "$seed" -ge 32 ] || device render "$picture.fgn" --size 256x256 --background grey \
+    --framing bust -o "$folder/people/bust_$(printf %02d "$seed").png"
 done
-scripts/run ffmpeg -v error -y -i "$folder/people/%02d.png" -vf "crop=150:256,tile=16x4" \
-  -frames:v 1 -q:v 4 "docs/sampler_$name.jpg"
+tile() {  # FILTER OUT INPUT...
+  scripts/run ffmpeg -v error -y "${@:3}" -vf "$1" -frames:v 1 -q:v 4 "$2"
+}
+tile crop=150:256,tile=16x4 "docs/sampler_$name.jpg" -i "$folder/people/%02d.png"
+tile tile=8x4 "docs/sampler_bust_$name.jpg" -i "$folder/people/bust_%02d.png"
+# The first 16 above, the training member that looks most like each below.
+scripts/run python3 scripts/experiments/nearest.py "$folder/generation.json" shipped \
+  > "$folder/nearest.txt"
+number=0
+while read -r member; do
+  device render "$population#$member" --size 256x256 --background grey \
+    -o "$folder/people/nearest_$(printf %02d "$number").png"
+  number=$((number + 1))
+done < "$folder/nearest.txt"
+tile crop=90:256,tile=16x1 "$folder/first.png" -i "$folder/people/%02d.png"
+tile crop=90:256,tile=16x1 "$folder/nearest.png" -i "$folder/people/nearest_%02d.png"
+scripts/run ffmpeg -v error -y -i "$folder/first.png" -i "$folder/nearest.png" \
+  -filter_complex vstack -q:v 4 "docs/sampler_nearest_$name.jpg"
 rm -rf "$folder/trace"
 device sample "$package" --seed 0 --trace "$folder/trace" -o "$folder/traced.fgn" 2> /dev/null
 scripts/run ffmpeg -v error -y -i "$folder/trace/step_%04d.png" -vf "crop=100:240,tile=20x1" \

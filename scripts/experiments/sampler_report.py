@@ -4,8 +4,8 @@ sampler_loss_NAME.csv.
 
     sampler_report.py FOLDER NAME OUTPUT COMMAND
 
-FOLDER is that of scripts/experiments/sampler.sh. Nothing is computed here. Objects of other names
-in generation.json stay.
+FOLDER is that of scripts/experiments/sampler.sh. Objects of other names in generation.json stay;
+"shipped" says of the package that ships how far it is from what is wanted of it.
 """
 
 import pathlib
@@ -49,6 +49,46 @@ def keep_entropy(before, now):
             run["posterior_entropy"] = old["posterior_entropy"]
 
 
+def drawn(comparison, key):
+    """Of all draws, where there are several."""
+    value = comparison.get("draws", comparison)[key]
+    return value["value"] if isinstance(value, dict) else value
+
+
+def describe_shipped(report, package):
+    """The package's row beside those of held-out and of training members."""
+    rows = {row["name"]: row for row in report["rows"]}
+    own, held_out, members = (rows[name] for name in ("shipped", "held-out members",
+                                                      "training members"))
+    copies = {"": [row["novelty"]["pictures"]["copy_share"] for row in (own, held_out)]}
+    for network in own["novelty"].get("perceptual", {}):
+        copies["network_"] = [row["novelty"]["perceptual"][network]["copy_share"]
+                              for row in (own, held_out)]
+    summary = {
+        "bytes": package.stat().st_size,
+        "samples": own["samples"],
+        "coverage_percent": drawn(own["held_out"], "coverage_percent"),
+        "coverage_below_members_points": drawn(members["held_out"], "coverage_percent")
+        - drawn(own["held_out"], "coverage_percent"),
+        "mmd_below_members_db": drawn(members["held_out"], "mmd_psnr_db")
+        - drawn(own["held_out"], "mmd_psnr_db"),
+        "one_nna_percent": drawn(own["held_out"], "one_nna_percent"),
+        "one_nna_percent_of_members": drawn(members["held_out"], "one_nna_percent"),
+        "highpass_ratio": own["highpass_ratio"],
+        "mixed_percent": 100 * own["by_part"]["mixed_share"],
+    }
+    if "unseen_captures" in own:
+        for key in ("coverage_percent", "mmd_psnr_db", "one_nna_percent"):
+            for whose, row in (("", own), ("_of_members", members)):
+                summary[f"unseen_{key}{whose}"] = row["unseen_captures"]["groups"][key]
+    if "bust" in own:
+        summary["bust_highpass_ratio"] = own["bust"]["highpass_ratio"]
+    for kind, (of_own, of_held_out) in copies.items():
+        summary[f"copy_share_{kind}percent"] = 100 * of_own
+        summary[f"copy_share_{kind}over_held_out_points"] = 100 * (of_own - of_held_out)
+    return summary
+
+
 def main():
     folder, name, output = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3])
     head = results.head(sys.argv[4])
@@ -56,9 +96,11 @@ def main():
     before = generation.get(name, {})
     generation[name] = head | without_paths(results.read(folder / "generation.json"))
     keep_entropy(before, generation[name])
+    generation["shipped"] = describe_shipped(
+        generation[name], pathlib.Path("samples/samplers") / f"{name}.fgn")
     write_generation(output, generation)
     losses = output / f"sampler_loss_{name}.csv"
-    runs = [run for run in ("basis", "layer") if (folder / run).exists()]
+    runs = [run for run in ("shipped", "alone", "layer") if (folder / run).exists()]
     results.write_text(losses, merged_losses(losses, folder, runs))
 
     golden = folder / "golden.txt"

@@ -59,7 +59,7 @@ def write_generation(output, generation):
     earlier = results.read_rows(path)
     rows = []
     for population, report in sorted(generation.items()):
-        for run in report["runs"]:
+        for run in report.get("runs", []):
             entropy = run.get("posterior_entropy")
             if entropy is None:
                 continue

@@ -3,26 +3,26 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "figurine/check.h"
 #include "figurine/texel_grid.h"
 #include "toolchain/error.h"
 #include "toolchain/measure/body_parts.h"
+#include "toolchain/measure/part_exchange.h"
 #include "toolchain/measure/statistics.h"
 #include "toolchain/random/counter.h"
 
 namespace figurine::generate {
 
 using measure::BodyPart;
-using measure::PartExchange;
 using measure::RowMatrix;
-using measure::RowVector;
 using measure::WeightLayout;
 
 namespace {
 
 // Streams of random numbers, beside those of the trainer.
-constexpr uint64_t kUpper = 101, kLower = 102, kCorpusSeed = 103;
+constexpr uint64_t kUpper = 101, kLower = 102;
 
 // The mean of the hands' static colours of every member; no columns where there are none. [N,C]
 RowMatrix hand_colours(const RowMatrix& training, const WeightLayout& layout,
@@ -83,9 +83,12 @@ PeopleMixer::PeopleMixer(const RowMatrix& training, const WeightLayout& layout,
   if (const std::string obstacle = measure::part_mixture_obstacle(population, body);
       !obstacle.empty())
     throw InputError(obstacle);
-  const PartExchange parts(population, body);
-  upper_ = parts.value_shares(BodyPart::kUpperBody, layout);
-  lower_ = parts.value_shares(BodyPart::kLowerBody, layout);
+  for (const measure::Token& token : layout.tokens()) {
+    const std::optional<BodyPart> part = measure::part_of_token(token.name);
+    from_.push_back(part == BodyPart::kUpperBody   ? From::kUpper
+                    : part == BodyPart::kLowerBody ? From::kLower
+                                                   : From::kBase);
+  }
   find_alike(hand_colours(training, layout, population, body), shapes_of(training, layout));
 }
 
@@ -112,32 +115,15 @@ MixedPerson PeopleMixer::draw(uint64_t seed, uint64_t counter, size_t base) cons
   return {base, pick(kUpper), pick(kLower)};
 }
 
-RowVector PeopleMixer::mix(const RowMatrix& training, const MixedPerson& person) const {
-  const auto row = [&](size_t member) { return training.row(Eigen::Index(member)).array(); };
-  return ((1 - upper_.array() - lower_.array()) * row(person.base) +
-          upper_.array() * row(person.upper) + lower_.array() * row(person.lower))
-      .matrix();
-}
-
-RowMatrix PeopleMixer::corpus(const RowMatrix& training, uint64_t seed) const {
-  const size_t count = members();
-  RowMatrix rows(training.rows() * Eigen::Index{1 + kCorpusPeople}, training.cols());
-  rows.topRows(training.rows()) = training;
-  for (size_t i = 0; i < kCorpusPeople * count; ++i)
-    rows.row(Eigen::Index(count + i)) = mix(training, draw(seed + kCorpusSeed, i, i % count));
-  return rows;
-}
-
-PeopleMixer::Parts PeopleMixer::parts(const RowMatrix& training, const ModelSpace& space) const {
-  const RowVector& mean = space.standardisation().mean();
-  const auto encoded = [&](const RowVector& share) {
-    RowMatrix rows = training;
-    for (Eigen::Index i = 0; i < rows.rows(); ++i)
-      rows.row(i) = (mean.array() + share.array() * (training.row(i) - mean).array()).matrix();
-    return space.encode(rows);
-  };
-  const RowVector base = (1 - upper_.array() - lower_.array()).matrix();
-  return {encoded(base), encoded(upper_), encoded(lower_)};
+size_t PeopleMixer::donor(const MixedPerson& person, size_t token) const {
+  switch (from_[token]) {
+    case From::kUpper:
+      return person.upper;
+    case From::kLower:
+      return person.lower;
+    default:
+      return person.base;
+  }
 }
 
 }  // namespace figurine::generate

@@ -1,12 +1,11 @@
 // People put together of a population's training members by part, as further people to learn from:
 // head, hands, shape and whatever else nobody exchanges of one; what another wears on the upper
-// body; what a third wears on the lower. A hundred members make a million of them, all as sharp as
-// members are, so that what a denoiser can learn by heart are parts, not people.
+// body; what a third wears on the lower. A hundred members make tens of thousands of them, all as
+// sharp as members are, so that what a denoiser can learn by heart are parts, not people.
 //
 // Donors are of like skin and build (below), since sleeves and skirts leave skin to be seen and
-// clothes are cut for a build.
-//
-// Letters: N training members, W values of a member, D values of a model vector.
+// clothes are cut for a build. A part is its tokens, whole: nothing is blended at its border, where
+// clothes have borders of their own, so that every token stays one that some member has.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +14,7 @@
 
 #include "figurine/body.h"
 #include "figurine/population.h"
-#include "toolchain/generate/model_space.h"
-#include "toolchain/measure/part_exchange.h"
+#include "toolchain/measure/weight_space.h"
 
 namespace figurine::generate {
 
@@ -29,8 +27,6 @@ class PeopleMixer {
  public:
   // Of every member there are this share of all, itself among them, that it takes clothes from.
   static constexpr double kAlikeShare = 0.25;
-  // Mixed people that a space is found from, for every member that it is found from.
-  static constexpr size_t kCorpusPeople = 2;
 
   // training: [N,W] by the layout, which is the population's on this body. Throws InputError where
   // they cannot be mixed by part (part_mixture_obstacle).
@@ -46,24 +42,15 @@ class PeopleMixer {
 
   // One on the base of this member, a function of the three numbers.
   MixedPerson draw(uint64_t seed, uint64_t counter, size_t base) const;
-  // The values of a mixed person, with u and l the shares of a cell (PartExchange) of the upper and
-  // the lower body:  (1 - u - l) base + u upper + l lower.  training: as given before. [W]
-  measure::RowVector mix(const measure::RowMatrix& training, const MixedPerson& person) const;
-  // The members and then mixed people on every one of them in turn: what a space is found from, so
-  // that it holds their seams. [(1 + kCorpusPeople) N, W]
-  measure::RowMatrix corpus(const measure::RowMatrix& training, uint64_t seed) const;
-
-  // What base, upper and lower body of every member add to a model vector of a linear space:
-  // encode(mix(person)) is the sum of three rows. [N,D] each.
-  struct Parts {
-    measure::RowMatrix base, upper, lower;
-  };
-  Parts parts(const measure::RowMatrix& training, const ModelSpace& space) const;
+  // Whose token this is, by its place in the layout.
+  size_t donor(const MixedPerson& person, size_t token) const;
 
  private:
+  enum class From : uint8_t { kBase, kUpper, kLower };
+
   void find_alike(const measure::RowMatrix& colours, const measure::RowMatrix& shapes);
 
-  measure::RowVector upper_, lower_;  // [W] shares
+  std::vector<From> from_;  // [L]
   std::vector<std::vector<size_t>> alike_;
 };
 

@@ -56,23 +56,30 @@ class LearntPeople {
  public:
   // mixer: none where only members are learnt from. Borrowed.
   LearntPeople(const RowMatrix& training, const ModelSpace& space, const PeopleMixer* mixer)
-      : members_(to_tensor(space.encode(training))), mixer_(mixer) {
-    if (mixer_ == nullptr) return;
-    const PeopleMixer::Parts parts = mixer_->parts(training, space);
-    base_ = to_tensor(parts.base), upper_ = to_tensor(parts.upper), lower_ = to_tensor(parts.lower);
-  }
+      : members_(to_tensor(space.encode(training))),
+        token_sizes_(space.token_sizes()),
+        mixer_(mixer) {}
 
   int64_t count() const { return members_.size(0); }
   int64_t size() const { return members_.size(1); }
   torch::Tensor member(size_t m) const { return members_[static_cast<int64_t>(m)]; }
+  // Token by token of whom it is.
   torch::Tensor mixed(size_t m, uint64_t seed, uint64_t counter) const {
     const MixedPerson person = mixer_->draw(seed, counter, m);
-    return base_[static_cast<int64_t>(person.base)] + upper_[static_cast<int64_t>(person.upper)] +
-           lower_[static_cast<int64_t>(person.lower)];
+    torch::Tensor values = member(person.base).clone();
+    int64_t at = 0;
+    for (size_t l = 0; l < token_sizes_.size(); ++l) {
+      const auto size = static_cast<int64_t>(token_sizes_[l]);
+      const size_t donor = mixer_->donor(person, l);
+      if (donor != person.base) values.narrow(0, at, size).copy_(member(donor).narrow(0, at, size));
+      at += size;
+    }
+    return values;
   }
 
  private:
-  torch::Tensor members_, base_, upper_, lower_;  // [N,D] each
+  torch::Tensor members_;  // [N,D]
+  std::vector<size_t> token_sizes_;
   const PeopleMixer* mixer_;
 };
 
@@ -211,8 +218,10 @@ Members members_of(const Population& population, const SamplerSettings& settings
                      " training members, " + std::to_string(settings.members) + " were asked for");
   }
   if (settings.mixed_share > 0) {
-    if (settings.space.variant == Variant::kLatent)
-      throw InputError("variant latent: its space is not linear, nobody can be mixed in it");
+    if (settings.space.variant != Variant::kLayer && settings.space.variant != Variant::kBasis) {
+      throw InputError(std::string("variant ") + to_string(settings.space.variant) +
+                       ": its tokens are no parts of a body, nobody can be mixed in it");
+    }
     members.mixer.emplace(members.training, *members.layout, population, opened->package.body());
   }
   return members;
@@ -436,9 +445,7 @@ void train_autoencoder(const std::shared_ptr<Autoencoder>& autoencoder,
 
 ModelSpace make_space(const Members& members, const SamplerSettings& settings,
                       std::shared_ptr<const WeightCodec> codec) {
-  const std::vector<measure::Token>& tokens = members.layout->tokens();
-  if (!members.mixer) return {members.training, tokens, settings.space, std::move(codec)};
-  return {members.mixer->corpus(members.training, settings.seed), tokens, settings.space, nullptr};
+  return {members.training, members.layout->tokens(), settings.space, std::move(codec)};
 }
 
 }  // namespace

@@ -21,9 +21,8 @@ constexpr double kFaintest = 0.05;  // quantile of members' own distances from t
 
 std::string part_of(const Token& token) {
   if (token.name == "shape") return "build";
-  if (!token.name.starts_with("static.")) return {};
-  const size_t group = token.name.find('.') + 1, part = token.name.find('.', group) + 1;
-  return token.name.substr(part, token.name.find('.', part) - part);
+  const std::optional<measure::BodyPart> part = measure::part_of_token(token.name);
+  return part ? to_string(*part) : std::string();
 }
 
 RowMatrix values_of(const PartStretch& part, const RowMatrix& rows) {

@@ -33,6 +33,8 @@ constexpr std::array<NamedJoint, 18> kNamedJoints{{
     {"hand", BodyPart::kHands},
 }};
 
+constexpr float kWorn = 0.1f;  // of a texel's skin weights
+
 std::string_view without_side(std::string_view name) {
   for (const std::string_view side : {"left_", "right_"}) {
     if (name.starts_with(side)) return name.substr(side.size());
@@ -68,6 +70,21 @@ std::vector<BodyPart> joint_parts(const Body& body) {
   return parts;
 }
 
+namespace {
+
+// Of head or hands, but moved by the upper body too: where collars and cuffs are.
+bool is_worn(const Body& body, const std::vector<BodyPart>& of_joint, uint32_t texel,
+             BodyPart part) {
+  if (part != BodyPart::kHead && part != BodyPart::kHands) return false;
+  float upper = 0;
+  for (size_t k = size_t{texel} * kSkinInfluences; k < size_t{texel + 1} * kSkinInfluences; ++k) {
+    if (of_joint[body.texel_joints[k]] == BodyPart::kUpperBody) upper += body.texel_weights[k];
+  }
+  return upper >= kWorn;
+}
+
+}  // namespace
+
 std::vector<BodyPart> texel_parts(const Body& body) {
   const std::vector<BodyPart> of_joint = joint_parts(body);
   std::vector<BodyPart> parts(body.texel_count());
@@ -76,7 +93,8 @@ std::vector<BodyPart> texel_parts(const Body& body) {
     const bool waist =
         body.joint_names[joint] == "pelvis" &&
         body.texel_position_m[size_t{3} * i + 1] > body.joint_position_m[3 * joint + 1];
-    parts[i] = waist ? BodyPart::kUpperBody : of_joint[joint];
+    parts[i] = waist || is_worn(body, of_joint, i, of_joint[joint]) ? BodyPart::kUpperBody
+                                                                    : of_joint[joint];
   }
   return parts;
 }

@@ -28,8 +28,9 @@ const char* to_string(BodyPart part);  // "head", "upper_body", "lower_body", "h
 // [J] by name: neck, head, jaw and eyes; spine, collars, shoulders and elbows; pelvis, hips, knees,
 // ankles and feet; wrists. A joint of another name goes with its parent (fingers, toes, hair).
 std::vector<BodyPart> joint_parts(const Body& body);
-// [N] of a texel's strongest joint; but of what the pelvis moves, the waist above its joint is of
-// the upper body, where shirts hang over trousers.
+// [N] of a texel's strongest joint. But of the upper body is the waist above the joint of the
+// pelvis, where shirts hang over trousers, and what of neck and wrists the upper body moves by a
+// tenth or more, where collars and cuffs are.
 std::vector<BodyPart> texel_parts(const Body& body);
 
 // Texels that head, neck and collar bones move most: head and shoulders, as captures frame them.

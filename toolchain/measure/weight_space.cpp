@@ -7,7 +7,6 @@
 
 #include "figurine/check.h"
 #include "figurine/texel_grid.h"
-#include "toolchain/measure/body_parts.h"
 
 namespace figurine::measure {
 
@@ -70,6 +69,16 @@ WeightLayout::Patches cut_into_patches(const TexelGrid& grid, const Body& body, 
 }
 
 }  // namespace
+
+std::optional<BodyPart> part_of_token(const std::string& name) {
+  if (!name.starts_with("static.")) return std::nullopt;
+  const size_t part = name.find('.', std::string("static.").size()) + 1;
+  const std::string own = name.substr(part, name.find('.', part) - part);
+  for (const BodyPart known : kBodyParts) {
+    if (own == to_string(known)) return known;
+  }
+  return std::nullopt;
+}
 
 WeightLayout::WeightLayout(const Network& network, size_t shape_coefficients) {
   add_network(network);

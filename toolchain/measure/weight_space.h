@@ -20,6 +20,7 @@
 
 #include <Eigen/Dense>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,6 +28,7 @@
 #include "figurine/body.h"
 #include "figurine/population.h"
 #include "figurine/sampler.h"
+#include "toolchain/measure/body_parts.h"
 
 namespace figurine::measure {
 
@@ -39,6 +41,9 @@ struct Token {
                      // "shape"; "static.G.PART.P": piece P of a part in group G
   size_t begin = 0, size = 0;
 };
+
+// The part of the body whose cells a token of a static group has; none of other tokens.
+std::optional<BodyPart> part_of_token(const std::string& name);
 
 // Memory behind an avatar that was made of a vector.
 struct WeightStorage {

@@ -1,0 +1,78 @@
+#!/usr/bin/env bash
+# Copies are a matter of time: samplers of 25, 50 and 100 people, learnt from alone and mixed by
+# part, each for several budgets; how many of their people are near copies, and how sharp and how
+# varied they are. Says which budget is shipped, by a rule that no test person has a part in.
+#
+#   scripts/experiments/copies.sh edge [FOLDER]
+#
+# FOLDER (default out/copies) keeps every run.
+# May be stopped and killed at any time; called again it goes on. Two cores train two runs at a
+# time, some 20 minutes; the evaluation takes ten. Writes docs/results/copies.json and
+# docs/sampler_copies.png.
+#
+# Environment: RUNS, which of them are trained and judged (all; a name is MEMBERS_alone_ITERATIONS,
+# MEMBERS_mixed_ITERATIONS or one of those below).
+set -euo pipefail
+. "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
+cd "$figurine_checkout"
+
+name=${1:?edge} folder=${2:-out/copies}
+population=samples/populations/$name body=samples/populations/$name/body.fgn \
+  features=samples/populations/${name}_features.safetensors
+for file in "$population/split.json" "$body"; do
+  [ -r "$file" ] || die "copies: $file: no such file"
+done
+. scripts/experiments/tools.sh
+
+if [ -z "${RUNS:-}" ]; then
+  RUNS=100_mixed_8000
+  for iterations in 4000 2000 1000 500; do
+    for members in 100 50 25; do
+      RUNS+=" ${members}_mixed_$iterations ${members}_alone_$iterations"
+    done
+  done
+  RUNS+=' decay small pieces half'
+fi
+read -ra runs <<< "$RUNS"
+
+options_of() {
+  local run=$1 iterations=2000 members=100 mixed=0
+  own=(--variant basis --rank 90 --size device --blocks 4 --bf16 --learning-rate 5e-4)
+  case $run in
+    decay) own+=(--weight-decay 0.3) ;;
+    small) own+=(--size small --blocks 2) ;;
+    pieces) mixed=0.9 own+=(--pieces 12) ;;
+    half) mixed=0.5 ;;
+    *)
+      members=${run%%_*} iterations=${run##*_}
+      case $run in *mixed*) mixed=0.9 ;; esac
+      ;;
+  esac
+  own+=(--iterations "$iterations" --members "$members" --mixed "$mixed")
+}
+
+# Two at a time.
+working=0
+for run in "${runs[@]}"; do
+  if [ "$working" -ge 2 ]; then
+    wait -n
+    working=$((working - 1))
+  fi
+  options_of "$run"
+  learn "$folder/$run" "${own[@]}" --body "$body" --quiet &
+  working=$((working + 1))
+done
+while [ "$working" -gt 0 ]; do
+  wait -n
+  working=$((working - 1))
+done
+
+judged=()
+for run in "${runs[@]}"; do judged+=(--run "$run=$folder/$run"); done
+step "evaluating"
+train evaluate generation --population "$population" --body "$body" --features "$features" \
+  --no-baselines --replicates 100 "${judged[@]}" -o "$folder/generation.json"
+scripts/setup plots
+scripts/run python3 scripts/experiments/copies_report.py "$folder" docs/results/copies.json \
+  docs/sampler_copies.png "scripts/experiments/copies.sh $name"
+step "done: docs/results/copies.json"
