@@ -407,7 +407,7 @@ TEST_F(CApi, DrawsAMemberOfAPopulation) {
 
 TEST_F(CApi, SamplesAnAvatarAndDrawsIt) {
   const AlignedBytes sampler_bytes = read_sample("samplers/edge.fgn"),
-                     body_bytes = read_sample("populations/edge_body.fgn");
+                     body_bytes = read_sample("populations/edge/body.fgn");
   const fig_package from = open_bytes(sampler_bytes.bytes(), "sampler"),
                     on = open_bytes(body_bytes.bytes(), "body");
   fig_sampler sampler{};
