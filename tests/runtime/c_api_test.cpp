@@ -429,7 +429,7 @@ TEST_F(CApi, SamplesAnAvatarAndDrawsIt) {
   SampledAvatar expected;
   ASSERT_TRUE(cpp->sample({.seed = 7, .steps = 2, .method = SolverMethod::kDdim}, expected).ok());
   const Avatar& same = expected.avatar();
-  const std::array<uint64_t, 2> hash = hash_weights(same.fixed_point, same.shape);
+  const std::array<uint64_t, 2> hash = hash_weights(same.fixed_point, same.shape, same.static_part);
   EXPECT_TRUE(std::equal(hash.begin(), hash.end(), info.weights_hash));
   ASSERT_EQ(info.shape_count, same.shape.size());
   EXPECT_TRUE(std::equal(same.shape.begin(), same.shape.end(), info.shape));
