@@ -7,7 +7,7 @@
 #
 # FOLDER (default out/copies) keeps every run.
 # May be stopped and killed at any time; called again it goes on. Two cores train two runs at a
-# time, some 20 minutes; the evaluation takes ten. Writes docs/results/copies.json and
+# time, some 25 minutes by estimate; the evaluation takes ten. Writes docs/results/copies.json and
 # docs/sampler_copies.png.
 #
 # Environment: RUNS, which of them are trained and judged (all; a name is MEMBERS_alone_ITERATIONS,
@@ -19,7 +19,7 @@ cd "$figurine_checkout"
 name=${1:?edge} folder=${2:-out/copies}
 population=samples/populations/$name body=samples/populations/$name/body.fgn \
   features=samples/populations/${name}_features.safetensors
-for file in "$population/split.json" "$body"; do
+for file in "$population/split.json" "$body" "$features"; do
   [ -r "$file" ] || die "copies: $file: no such file"
 done
 . scripts/experiments/tools.sh
