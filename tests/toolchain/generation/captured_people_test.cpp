@@ -191,6 +191,40 @@ TEST_F(CapturedPeopleTest, AreTheSameWhoeverElseIsDrawn) {
   }
 }
 
+// Seven people in no part of the recipe, three at a time beside three training members; by hand.
+TEST_F(CapturedPeopleTest, UnseenPeopleAreReferencesInGroupsOfOneSize) {
+  const CapturedPeople true_people = people(recipe_of_five());
+  GenerationOptions options{.replicates = 10};
+  options.unseen = true_people.draw_unseen(*set_, 7);
+  const People again = true_people.draw_unseen(*set_, 2);
+  for (size_t i = 0; i < 2; ++i)
+    EXPECT_EQ(options.unseen[i][0].rgba, again[i][0].rgba) << "the same whoever else is drawn";
+  EXPECT_LT(union_error(options.unseen[0][0], options.unseen[1][0]).psnr_db(), 30);
+  const nlohmann::json report =
+      evaluate_generation(*set_, {{.name = "copies", .z = set_->training_z}}, options);
+  EXPECT_EQ(report.at("references").at("unseen").at("people"), 7);
+  const nlohmann::json& copies = report.at("rows")[0];
+  double mmd_db[2]{};
+  for (size_t i = 0; i < 6; ++i) {
+    double best = 0;
+    for (size_t n = 0; n < 3; ++n) {
+      best = std::max(best,
+                      union_error(set_->pictures[set_->training[n]], options.unseen[i]).psnr_db());
+    }
+    mmd_db[i / 3] += best / 3;
+  }
+  const nlohmann::json& unseen = copies.at("unseen_captures");
+  EXPECT_NEAR(unseen.at("mmd_psnr_db").at("value").get<double>(), mmd_db[0], 1e-9);
+  EXPECT_EQ(unseen.at("groups").at("count"), 2) << "the seventh is left over";
+  EXPECT_NEAR(unseen.at("groups").at("mmd_psnr_db").get<double>(), (mmd_db[0] + mmd_db[1]) / 2,
+              1e-9);
+  // Copies are copies close up, too, and as sharp.
+  ASSERT_TRUE(set_->has_busts());
+  EXPECT_EQ(copies.at("bust").at("novelty").at("copy_share"), 1);
+  EXPECT_NEAR(copies.at("bust").at("highpass_ratio").get<double>(), 1, 0.02);
+  EXPECT_EQ(copies.at("novelty").at("pictures").at("nearest")[1], set_->name(set_->training[1]));
+}
+
 TEST_F(CapturedPeopleTest, EveryRowIsHeldAgainstThem) {
   GenerationOptions options{.replicates = 10};
   const std::vector<Generated> copies{{.name = "copies", .z = set_->training_z}};
