@@ -48,24 +48,10 @@ options_of() {
       case $run in *mixed*) mixed=0.9 ;; esac
       ;;
   esac
-  own+=(--iterations "$iterations" --members "$members" --mixed "$mixed")
+  own+=(--iterations "$iterations" --members "$members" --mixed "$mixed" --body "$body" --quiet)
 }
 
-# Two at a time.
-working=0
-for run in "${runs[@]}"; do
-  if [ "$working" -ge 2 ]; then
-    wait -n
-    working=$((working - 1))
-  fi
-  options_of "$run"
-  learn "$folder/$run" "${own[@]}" --body "$body" --quiet &
-  working=$((working + 1))
-done
-while [ "$working" -gt 0 ]; do
-  wait -n
-  working=$((working - 1))
-done
+learn_all
 
 judged=()
 for run in "${runs[@]}"; do judged+=(--run "$run=$folder/$run"); done

@@ -21,7 +21,9 @@
 # FOLDER (default out/structures) keeps every step: run it again and it goes on where it stopped.
 #
 # Environment: LEARNERS (12 at edge, 60 at nano), PEOPLE (6, 15), ITERATIONS of a person (1000,
-# 600), SAMPLER_ITERATIONS (1500). On two quiet cores forty minutes each.
+# 600), SAMPLER_ITERATIONS (1500); STATE, a population's state folder made with --keep-captures:
+# its body, and the first of its training people in its pictures, in place of captures of this
+# script's own. On two quiet cores forty minutes each.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
@@ -42,7 +44,15 @@ case $scale in
   *) die "structures: '$scale': edge or nano" ;;
 esac
 programs=()
-. scripts/experiments/people.sh
+if [ -n "${STATE:-}" ]; then
+  for file in "$STATE/split.json" "$STATE/captures" "$STATE/body.fgn"; do
+    [ -r "$file" ] || die "structures: $file: no such file"
+  done
+  . scripts/experiments/tools.sh
+  body=$STATE/body.fgn
+else
+  . scripts/experiments/people.sh
+fi
 
 # Two at a time, one core each.
 beside() {
@@ -51,7 +61,24 @@ beside() {
 }
 all() { while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done; }
 
+link_people() {  # NAME COUNT: the state's people under numbers from 0
+  local number=0 person
+  mkdir -p "$folder/$1"
+  for person in $(scripts/run python3 -c 'import json, sys
+first = int(sys.argv[3]) if sys.argv[2] == "people" else 0
+print(*json.load(open(sys.argv[1]))["train"][first:first + int(sys.argv[4])])' \
+    "$STATE/split.json" "$1" "$learners" "$2"); do
+    [ -e "$folder/$1/$(printf %06d "$number")" ] ||
+      cp -al "$STATE/captures/$person" "$folder/$1/$(printf %06d "$number")"
+    number=$((number + 1))
+  done
+  [ "$number" = "$2" ] || die "structures: $STATE: has $number $1, $2 were asked for"
+}
 capture_people() {  # NAME COUNT SEED
+  [ -z "${STATE:-}" ] || {
+    link_people "$@"
+    return
+  }
   [ -e "$folder/$1/.done" ] || {
     step "captures of $2 $1"
     train capture --body "$body" --identities "$2" --seed "$3" "${pictures[@]}" "${motions[@]}" \

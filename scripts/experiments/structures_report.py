@@ -80,6 +80,7 @@ def row(name, runs, free, people):
         result[group] = {
             key: statistics.fmean(runs[person][0][group][key] for person in people)
             for key in FIGURES
+            if all(runs[person][0][group].get(key) is not None for person in people)
         }
         if free:
             below = [free[person][0][group]["psnr_db"] - runs[person][0][group]["psnr_db"]

@@ -29,3 +29,14 @@ learn() {
     train sampler --population "$population" --threads 1 -o "$run" "$@"
   fi
 }
+
+# All of the array $runs, two at a time; options_of RUN sets the array $own.
+learn_all() {
+  local run
+  for run in "${runs[@]}"; do
+    while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n; done
+    options_of "$run"
+    learn "$folder/$run" "${own[@]}" &
+  done
+  while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done
+}

@@ -109,6 +109,7 @@ class Sampler(Avatar):
         words = ["sampler", "--population", self.tools.population, "-o", folder, "--quiet"]
         if resume and (folder / "run.json").exists():
             return [*words, "--resume"]
+        words += ["--body", self.tools.sampler_body]
         return [*words, "--variant", "basis", "--size", "small", "--rank", 4, "--batch", 4,
                 "--members", 8, "--iterations", 60, "--threads", 1, "--checkpoint-seconds", 0.2]
 

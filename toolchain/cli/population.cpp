@@ -64,6 +64,9 @@ void add_population_command(CLI::App& app) {
                    "K/N: every N-th member alone, from K (counted from 0) on, beside processes "
                    "that make the others; no package. Called without, the command then packs")
       ->excludes(shared_only);
+  command->add_flag("--keep-captures", options->keep_captures,
+                    "Leave the images of finished members in OUTPUT/captures, where another "
+                    "population of the same people finds them");
   command->add_flag("--quiet", options->quiet, "No progress, no summary");
   command->callback([options, minutes, part] {
     options->stop_after_s = 60 * *minutes;

@@ -18,7 +18,7 @@ namespace {
 
 struct SamplerArguments {
   generate::SamplerRequest request;
-  std::string variant = "basis", size = "device";
+  std::string variant = "basis", size = "device", prediction = "clean";
   std::optional<int64_t> d_model, blocks, heads, feed_forward;
   std::optional<double> minutes;
   std::optional<uint64_t> iterations;
@@ -29,6 +29,7 @@ void run(SamplerArguments arguments) {
   generate::SamplerSettings& settings = request.settings;
   const generate::TransformerPreset& size = generate::find_transformer_preset(arguments.size);
   settings.space.variant = generate::variant_from_string(arguments.variant);
+  settings.shape.prediction = generate::prediction_from_string(arguments.prediction);
   settings.shape.d_model = arguments.d_model.value_or(size.d_model);
   settings.shape.blocks = arguments.blocks.value_or(size.blocks);
   settings.shape.heads = arguments.heads.value_or(size.heads);
@@ -127,6 +128,15 @@ void add_sampler_command(CLI::App& app) {
       ->add_option("--learning-rate", settings.schedule.peak,
                    "Of AdamW, at its highest (default 2e-4)")
       ->check(ports::between(1e-9, 1.0));
+  command
+      ->add_option("--prediction", arguments->prediction,
+                   "What the transformer says: clean values, or velocity (flow matching; has no "
+                   "package yet)")
+      ->check(ports::one_of({"clean", "velocity"}));
+  command
+      ->add_option("--dropout", settings.dropout,
+                   "Share that the transformer's blocks leave out in training (default 0)")
+      ->check(ports::between(0.0, 0.95));
   command->add_option("--weight-decay", settings.weight_decay, "Of AdamW (default 0)")
       ->check(ports::between(0.0, 10.0));
   command

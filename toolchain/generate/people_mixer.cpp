@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 
 #include "figurine/check.h"
 #include "figurine/texel_grid.h"
@@ -84,10 +83,9 @@ PeopleMixer::PeopleMixer(const RowMatrix& training, const WeightLayout& layout,
       !obstacle.empty())
     throw InputError(obstacle);
   for (const measure::Token& token : layout.tokens()) {
-    const std::optional<BodyPart> part = measure::part_of_token(token.name);
-    from_.push_back(part == BodyPart::kUpperBody   ? From::kUpper
-                    : part == BodyPart::kLowerBody ? From::kLower
-                                                   : From::kBase);
+    from_.push_back(token.part == BodyPart::kUpperBody   ? From::kUpper
+                    : token.part == BodyPart::kLowerBody ? From::kLower
+                                                         : From::kBase);
   }
   find_alike(hand_colours(training, layout, population, body), shapes_of(training, layout));
 }

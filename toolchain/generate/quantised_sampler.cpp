@@ -73,6 +73,11 @@ QuantisedSampler::QuantisedSampler(const TrainedSampler& trained, std::vector<Qu
     throw InputError(std::string("sampler: variant ") + to_string(trained.settings.space.variant) +
                      " has no package; basis has");
   }
+  if (trained.settings.shape.prediction != Prediction::kClean) {
+    throw InputError(std::string("sampler: prediction ") +
+                     to_string(trained.settings.shape.prediction) +
+                     " has no package: devices know clean values");
+  }
   const Population& population = trained.population->package.population();
   sampler_.name = name;
   sampler_.population_hash = trained.population->package.content_hash();

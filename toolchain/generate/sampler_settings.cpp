@@ -41,6 +41,7 @@ nlohmann::json to_json(const SamplerSettings& settings) {
                          {"beta1", settings.beta1},
                          {"beta2", settings.beta2},
                          {"weight_decay", settings.weight_decay},
+                         {"dropout", settings.dropout},
                          {"learning_rate", schedule.peak},
                          {"ramp_iterations", schedule.ramp_iterations},
                          {"floor_fraction", schedule.floor_fraction},
@@ -73,6 +74,7 @@ SamplerSettings sampler_settings_from_json(const nlohmann::json& json, const std
     settings.beta1 = json.at("beta1").get<double>(),
     settings.beta2 = json.at("beta2").get<double>();
     settings.weight_decay = json.at("weight_decay").get<double>();
+    settings.dropout = json.value("dropout", 0.0);
     settings.schedule.peak = json.at("learning_rate").get<double>();
     settings.schedule.ramp_iterations = json.at("ramp_iterations").get<uint64_t>();
     settings.schedule.floor_fraction = json.at("floor_fraction").get<double>();

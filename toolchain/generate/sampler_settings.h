@@ -52,6 +52,7 @@ struct SamplerSettings {
   bool bf16 = false;
   uint32_t threads = 1;
   double beta1 = 0.9, beta2 = 0.999, weight_decay = 0;
+  double dropout = 0;  // of what the transformer's blocks add
   train::Schedule schedule{.peak = 2e-4,
                            .ramp_iterations = 200,
                            .floor_fraction = 0.02,

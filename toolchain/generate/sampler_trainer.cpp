@@ -32,7 +32,7 @@ namespace {
 constexpr int kSamplerFormat = 1;
 constexpr int64_t kValidationDraws =
     16;  // noise levels for each validation member, always the same ones
-enum Stream : uint64_t { kLevels = 1, kNoise = 2, kValidationNoise = 3, kMixed = 4 };
+enum Stream : uint64_t { kLevels = 1, kNoise = 2, kValidationNoise = 3, kMixed = 4, kDropout = 5 };
 
 struct NoisyBatch {
   torch::Tensor z, lambda, clean;  // [B,D], [B], [B,D]
@@ -118,8 +118,14 @@ class Denoising : public FlatModel {
       add_noisy(noisy, row, person, draw_noise(settings_.seed, kNoise, counter, size),
                 noise_.level(u));
     }
-    return torch::mse_loss(transformer_.forward(noisy.z, noisy.lambda, settings_.bf16),
-                           noisy.clean);
+    if (settings_.dropout > 0) {
+      // By iteration and place: a training that goes on leaves out what it would have left out.
+      torch::manual_seed(
+          random::CounterRandom(settings_.seed, kDropout)
+              .bits(iteration * static_cast<uint64_t>(batch) + static_cast<uint64_t>(share.first)));
+    }
+    return error(transformer_.forward(noisy.z, noisy.lambda, settings_.bf16, settings_.dropout),
+                 noisy);
   }
 
   // At noise that never changes.
@@ -130,15 +136,21 @@ class Denoising : public FlatModel {
     for (int64_t first = 0; first < rows; first += settings_.batch) {
       const int64_t count = std::min<int64_t>(settings_.batch, rows - first);
       const auto part = [&](const torch::Tensor& all) { return all.narrow(0, first, count); };
-      const torch::Tensor x =
-          transformer_.forward(part(validation_.z), part(validation_.lambda), settings_.bf16);
-      sum +=
-          torch::mse_loss(x, part(validation_.clean)).item<double>() * static_cast<double>(count);
+      const NoisyBatch noisy{part(validation_.z), part(validation_.lambda),
+                             part(validation_.clean)};
+      const torch::Tensor x = transformer_.forward(noisy.z, noisy.lambda, settings_.bf16);
+      sum += error(x, noisy).item<double>() * static_cast<double>(count);
     }
     return sum / static_cast<double>(rows);
   }
 
  private:
+  // Mean square of what the last layer is wrong by: x, or, of flow matching, (x - clean) / t.
+  torch::Tensor error(const torch::Tensor& x, const NoisyBatch& noisy) const {
+    if (settings_.shape.prediction == Prediction::kClean) return torch::mse_loss(x, noisy.clean);
+    return ((x - noisy.clean) / noise_share(noisy.lambda).unsqueeze(1)).square().mean();
+  }
+
   void make_validation(const torch::Tensor& members) {
     const int64_t size = training_.size(), count = members.size(0);
     if (count == 0) return;

@@ -45,9 +45,23 @@ FlatLayout layout_of(const TransformerShape& shape) {
   return layout;
 }
 
+constexpr std::pair<Prediction, const char*> kPredictions[] = {{Prediction::kClean, "clean"},
+                                                               {Prediction::kVelocity, "velocity"}};
+
 bool ends_with(const std::string& text, const char* end) { return text.ends_with(end); }
 
 }  // namespace
+
+const char* to_string(Prediction prediction) {
+  return kPredictions[static_cast<size_t>(prediction)].second;
+}
+
+Prediction prediction_from_string(const std::string& name) {
+  for (const auto& [prediction, own] : kPredictions) {
+    if (name == own) return prediction;
+  }
+  throw InputError("sampler: prediction: '" + name + "' is neither clean nor velocity");
+}
 
 void check(const TransformerShape& shape) {
   if (shape.token_sizes.empty()) throw InputError("sampler: token_sizes: there are none");
@@ -71,7 +85,8 @@ void check(const TransformerShape& shape) {
 }
 
 nlohmann::json to_json(const TransformerShape& shape) {
-  return {{"token_sizes", shape.token_sizes},
+  return {{"prediction", to_string(shape.prediction)},
+          {"token_sizes", shape.token_sizes},
           {"d_model", shape.d_model},
           {"blocks", shape.blocks},
           {"heads", shape.heads},
@@ -81,6 +96,8 @@ nlohmann::json to_json(const TransformerShape& shape) {
 TransformerShape shape_from_json(const nlohmann::json& json, const std::string& where) {
   TransformerShape shape;
   try {
+    // Runs before flow matching say nothing.
+    shape.prediction = prediction_from_string(json.value("prediction", "clean"));
     shape.token_sizes = json.at("token_sizes").get<std::vector<int64_t>>();
     shape.d_model = json.at("d_model").get<int64_t>(),
     shape.blocks = json.at("blocks").get<int64_t>();
@@ -112,6 +129,10 @@ torch::Tensor embed_lambda(const torch::Tensor& lambda, int64_t width) {
   const torch::Tensor frequency = kSlowest * torch::exp(step * std::log(kFastest / kSlowest));
   const torch::Tensor angle = lambda.to(torch::kFloat64).unsqueeze(1) * frequency;
   return torch::cat({angle.sin(), angle.cos()}, 1).to(torch::kFloat32);
+}
+
+torch::Tensor noise_share(const torch::Tensor& lambda) {
+  return (1 / (1 + lambda.to(torch::kFloat64).exp())).to(torch::kFloat32);
 }
 
 struct Transformer::Impl {
@@ -152,7 +173,19 @@ struct Transformer::Impl {
     return reader.linear(mixed.transpose(1, 2).reshape({batch, tokens, shape.d_model}));
   }
 
-  torch::Tensor forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16) const {
+  torch::Tensor forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16,
+                        double dropout) const {
+    if (shape.prediction == Prediction::kClean) return last_layer(z, lambda, bf16, dropout);
+    const torch::Tensor t = noise_share(lambda).unsqueeze(1);
+    const torch::Tensor y = z * torch::sqrt(t * t + (1 - t) * (1 - t));  // 1 / (alpha + sigma)
+    return y - t * last_layer(y, lambda, bf16, dropout);
+  }
+
+  torch::Tensor last_layer(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16,
+                           double dropout) const {
+    const auto kept = [&](const torch::Tensor& added) {
+      return dropout > 0 ? torch::dropout(added, dropout, true) : added;
+    };
     Reader reader{*this, 0, bf16};
     std::vector<torch::Tensor> tokens{torch::Tensor()};
     for (const torch::Tensor& part : z.split_with_sizes(splits, 1))
@@ -163,9 +196,9 @@ struct Transformer::Impl {
     torch::Tensor t = torch::stack(tokens, 1) + position;
     for (int64_t b = 0; b < shape.blocks; ++b) {
       const torch::Tensor normed = reader.norm(t);
-      t = t + attention(reader, normed);
+      t = t + kept(attention(reader, normed));
       const torch::Tensor hidden = reader.linear(reader.norm(t));
-      t = t + reader.linear(torch::gelu(hidden));
+      t = t + kept(reader.linear(torch::gelu(hidden)));
     }
     t = reader.norm(t);
     std::vector<torch::Tensor> out;
@@ -199,9 +232,9 @@ Transformer::Transformer(const TransformerShape& shape, uint64_t seed) {
 
 Transformer::~Transformer() = default;
 
-torch::Tensor Transformer::forward(const torch::Tensor& z, const torch::Tensor& lambda,
-                                   bool bf16) const {
-  return impl_->forward(z, lambda, bf16);
+torch::Tensor Transformer::forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16,
+                                   double dropout) const {
+  return impl_->forward(z, lambda, bf16, dropout);
 }
 torch::Tensor& Transformer::weights() { return impl_->parameters.weights(); }
 torch::Tensor& Transformer::gradients() { return impl_->parameters.gradients(); }

@@ -9,8 +9,13 @@
 // lambda = ln(alpha / sigma), half the log of the signal-to-noise ratio, is the only time there is:
 // the network knows no number of steps. All parameters live in one flat tensor (flat_parameters.h).
 //
+// What comes out of the last layer is the clean values, or, of kVelocity, the way from them to the
+// noise on a straight line, as in flow matching. With t = sigma / (alpha + sigma):
+//
+//   y = (1 - t) x + t eps = z / (alpha + sigma);   v = eps - x = F(y, lambda);   x = y - t v
+//
 // Based on: the paper, section 4.2; Erkoc et al., HyperDiffusion, 2023; Radford et al., GPT-2, 2019
-// (pre-norm blocks).
+// (pre-norm blocks); Lipman et al., Flow matching, 2023; Srivastava et al., Dropout, 2014.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +29,12 @@
 
 namespace figurine::generate {
 
+enum class Prediction : uint8_t { kClean, kVelocity };
+const char* to_string(Prediction prediction);                // "clean", "velocity"
+Prediction prediction_from_string(const std::string& name);  // throws InputError
+
 struct TransformerShape {
+  Prediction prediction = Prediction::kClean;
   std::vector<int64_t> token_sizes;  // [L]
   int64_t d_model = 512;
   int64_t blocks = 12;
@@ -53,9 +63,10 @@ class Transformer {
 
   // z: [B,D] noisy values; lambda: [B], finite. Returns the predicted clean values [B,D],
   // differentiable by the weights. bf16: matrix products in bfloat16, sums, norms and results in
-  // float.
-  torch::Tensor forward(const torch::Tensor& z, const torch::Tensor& lambda,
-                        bool bf16 = false) const;
+  // float. dropout: the share of what blocks add to a token that is left out, the rest scaled up;
+  // drawn by LibTorch's own generator, which the caller seeds.
+  torch::Tensor forward(const torch::Tensor& z, const torch::Tensor& lambda, bool bf16 = false,
+                        double dropout = 0) const;
 
   torch::Tensor& weights();    // [P] flat; assign into it in place only
   torch::Tensor& gradients();  // [P] flat; backward passes add to it
@@ -66,6 +77,9 @@ class Transformer {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+// t of kVelocity for every lambda: [B], of z's kind.
+torch::Tensor noise_share(const torch::Tensor& lambda);
 
 // [B] to [B,width]: sines, then cosines, of lambda times width / 2 frequencies, geometric from 1/20
 // to 20 radians a unit: the slowest turns once over every range in use, the fastest tells steps

@@ -21,8 +21,7 @@ constexpr double kFaintest = 0.05;  // quantile of members' own distances from t
 
 std::string part_of(const Token& token) {
   if (token.name == "shape") return "build";
-  const std::optional<measure::BodyPart> part = measure::part_of_token(token.name);
-  return part ? to_string(*part) : std::string();
+  return token.part ? to_string(*token.part) : std::string();
 }
 
 RowMatrix values_of(const PartStretch& part, const RowMatrix& rows) {

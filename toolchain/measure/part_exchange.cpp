@@ -11,8 +11,6 @@ namespace figurine::measure {
 
 namespace {
 
-constexpr std::array kExchanged{BodyPart::kHead, BodyPart::kUpperBody, BodyPart::kLowerBody};
-
 // Texels sorted by height, so that those within a distance are found among few.
 class SortedTexels {
  public:
@@ -63,7 +61,7 @@ PartExchange::PartExchange(const Population& population, const Body& body) {
   const std::vector<BodyPart> of_texel = texel_parts(body);
   for (const StaticGroup& group : population.static_part.groups)
     channels_.push_back(group.channels);
-  for (const BodyPart part : kExchanged) {
+  for (const BodyPart part : kExchangedParts) {
     SortedTexels inside(body), outside(body);
     for (uint32_t i = 0; i < body.texel_count(); ++i)
       (of_texel[i] == part ? inside : outside).add(i);

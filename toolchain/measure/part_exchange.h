@@ -12,6 +12,10 @@
 
 namespace figurine::measure {
 
+// What may come from somebody else: the first of BodyPart. Hands stay with whose body it is.
+inline constexpr std::array kExchangedParts{BodyPart::kHead, BodyPart::kUpperBody,
+                                            BodyPart::kLowerBody};
+
 // Why members cannot be mixed by part: they have no maps, or the body has no texel that a joint
 // with a part's name moves most. Empty: they can.
 std::string part_mixture_obstacle(const Population& population, const Body& body);
@@ -38,9 +42,9 @@ class PartExchange {
   size_t texels(BodyPart part) const { return texels_[static_cast<size_t>(part)]; }
 
  private:
-  static constexpr size_t kParts = 3;  // head, upper body, lower body: the first of BodyPart
-  std::array<std::vector<std::vector<double>>, kParts> shares_;  // [parts][groups][cells]
-  std::array<size_t, kParts> texels_{};
+  std::array<std::vector<std::vector<double>>, kExchangedParts.size()>
+      shares_;  // [parts][groups][cells]
+  std::array<size_t, kExchangedParts.size()> texels_{};
   std::vector<uint32_t> channels_;  // [groups]
 };
 

@@ -41,11 +41,13 @@ uint64_t z_order(uint32_t v, uint32_t u) {
   return place;
 }
 
+}  // namespace
+
 // The cells of every part of the body along that curve, cut into pieces of one size, or one more:
 // `pieces` of the grid, and one more for every part that does not fill its last. names:
 // "PART.PIECE" of each.
-WeightLayout::Patches cut_into_patches(const TexelGrid& grid, const Body& body, size_t pieces,
-                                       std::vector<std::string>& names) {
+WeightLayout::Patches WeightLayout::cut_into_patches(const TexelGrid& grid, const Body& body,
+                                                     size_t pieces, std::vector<PatchName>& names) {
   const std::vector<BodyPart> of_texel = texel_parts(body);
   const size_t most = (grid.cell_count() + pieces - 1) / pieces;
   WeightLayout::Patches patches;
@@ -61,23 +63,11 @@ WeightLayout::Patches cut_into_patches(const TexelGrid& grid, const Body& body, 
     for (size_t p = 0; p < own; ++p) {
       const size_t size = rows.size() * (p + 1) / own - rows.size() * p / own;
       patches.patch_rows.push_back(static_cast<uint32_t>(size));
-      names.push_back(std::string(to_string(part)) + "." + std::to_string(p));
+      names.push_back({std::string(to_string(part)) + "." + std::to_string(p), part});
     }
     patches.row.insert(patches.row.end(), rows.begin(), rows.end());
   }
   return patches;
-}
-
-}  // namespace
-
-std::optional<BodyPart> part_of_token(const std::string& name) {
-  if (!name.starts_with("static.")) return std::nullopt;
-  const size_t part = name.find('.', std::string("static.").size()) + 1;
-  const std::string own = name.substr(part, name.find('.', part) - part);
-  for (const BodyPart known : kBodyParts) {
-    if (own == to_string(known)) return known;
-  }
-  return std::nullopt;
 }
 
 WeightLayout::WeightLayout(const Network& network, size_t shape_coefficients) {
@@ -95,7 +85,7 @@ WeightLayout::WeightLayout(const Population& population, const Body& body, size_
   end_network();
   for (size_t g = 0; g < population.static_part.groups.size(); ++g) {
     const StaticGroup& group = population.static_part.groups[g];
-    std::vector<std::string> names;
+    std::vector<PatchName> names;
     Patches patches = cut_into_patches(make_texel_grid(body, group.grid_size), body, pieces, names);
     FIG_CHECK(patches.row.size() * group.channels == group.values.size(),
               "a row of static values for every cell");
@@ -116,14 +106,14 @@ WeightLayout::WeightLayout(const Sampler& sampler) : own_network_(!sampler.share
   end_network();
   for (size_t g = 0; g < sampler.static_groups.size(); ++g) {
     const SampledStaticGroup& group = sampler.static_groups[g];
-    std::vector<std::string> names;
-    for (size_t p = 0; p < group.patch_rows.size(); ++p) names.push_back(std::to_string(p));
+    std::vector<PatchName> names;
+    for (size_t p = 0; p < group.patch_rows.size(); ++p) names.push_back({std::to_string(p), {}});
     add_group(g, group.channels, {{group.row.begin(), group.row.end()}, group.patch_rows}, names);
   }
 }
 
-void WeightLayout::add(const std::string& name, size_t size) {
-  tokens_.push_back({name, size_, size});
+void WeightLayout::add(const std::string& name, size_t size, std::optional<BodyPart> part) {
+  tokens_.push_back({name, size_, size, part});
   size_ += size;
 }
 
@@ -141,7 +131,7 @@ void WeightLayout::end_network() {
 }
 
 void WeightLayout::add_group(size_t group, uint32_t channels, Patches patches,
-                             const std::vector<std::string>& names) {
+                             const std::vector<PatchName>& names) {
   const size_t first = place_.size();
   place_.resize(first + patches.row.size() * channels);
   size_t next = 0;
@@ -151,7 +141,7 @@ void WeightLayout::add_group(size_t group, uint32_t channels, Patches patches,
       for (uint32_t c = 0; c < channels; ++c)
         place_[first + size_t{patches.row[next]} * channels + c] = at++;
     }
-    add("static." + std::to_string(group) + "." + names[p], at - size_);
+    add("static." + std::to_string(group) + "." + names[p].name, at - size_, names[p].part);
   }
   patches_.push_back(std::move(patches));
 }

@@ -28,6 +28,7 @@
 #include "figurine/body.h"
 #include "figurine/population.h"
 #include "figurine/sampler.h"
+#include "figurine/texel_grid.h"
 #include "toolchain/measure/body_parts.h"
 
 namespace figurine::measure {
@@ -40,10 +41,9 @@ struct Token {
   std::string name;  // "layer.N" by the order of the convolutions, as a run's weights are called;
                      // "shape"; "static.G.PART.P": piece P of a part in group G
   size_t begin = 0, size = 0;
+  std::optional<BodyPart> part;  // whose cells it has; none of kernels and shape, nor where only a
+                                 // sampler's package is known
 };
-
-// The part of the body whose cells a token of a static group has; none of other tokens.
-std::optional<BodyPart> part_of_token(const std::string& name);
 
 // Memory behind an avatar that was made of a vector.
 struct WeightStorage {
@@ -92,11 +92,18 @@ class WeightLayout {
   Avatar with(const Avatar& avatar, std::span<const double> weights, WeightStorage& storage) const;
 
  private:
-  void add(const std::string& name, size_t size);
+  struct PatchName {
+    std::string name;  // in its group
+    std::optional<BodyPart> part;
+  };
+
+  void add(const std::string& name, size_t size, std::optional<BodyPart> part = {});
   void add_network(const Network& network);
   void end_network();  // what is added from here on is the map's
   void add_group(size_t group, uint32_t channels, Patches patches,
-                 const std::vector<std::string>& names);
+                 const std::vector<PatchName>& names);
+  static Patches cut_into_patches(const TexelGrid& grid, const Body& body, size_t pieces,
+                                  std::vector<PatchName>& names);
 
   bool own_network_ = true;
   std::vector<Token> tokens_;

@@ -20,8 +20,6 @@ using train::OpenedMember;
 
 namespace {
 
-constexpr std::array kExchanged{BodyPart::kHead, BodyPart::kUpperBody, BodyPart::kLowerBody};
-
 const char* to_string(PartRow row) {
   switch (row) {
     case PartRow::kA:
@@ -39,7 +37,7 @@ const char* to_string(PartRow row) {
 
 BodyPart part_of(PartRow row) {
   FIG_CHECK(row >= PartRow::kHead, "a row that takes a part");
-  return kExchanged[static_cast<size_t>(row) - static_cast<size_t>(PartRow::kHead)];
+  return measure::kExchangedParts[static_cast<size_t>(row) - static_cast<size_t>(PartRow::kHead)];
 }
 
 }  // namespace

@@ -307,7 +307,13 @@ void build(const BuildOptions& options) {
   make_body(recipe, options, state);
   const train::PackageFile body = train::open_package(state.body(), PackageKind::kBody);
   const Motions motions = read_motions(recipe, options.recipe, body.package.body());
-  const Workshop workshop{recipe, state, body, motions.clips, motions.sources, options.makehuman};
+  const Workshop workshop{recipe,
+                          state,
+                          body,
+                          motions.clips,
+                          motions.sources,
+                          options.makehuman,
+                          options.keep_captures};
 
   train::Progress progress(recipe.name, options.quiet);
   make_initial_weights(workshop, options.slots, [&](const InitialWeightsProgress& at) {

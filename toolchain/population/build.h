@@ -19,6 +19,7 @@ struct BuildOptions {
   // beginning with `part`, and neither table nor package. What all members share must be there.
   uint32_t part = 0, parts = 1;
   bool initial_weights_only = false;
+  bool keep_captures = false;  // for another population of the same people
   bool quiet = false;
 };
 

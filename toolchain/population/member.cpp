@@ -142,8 +142,9 @@ nlohmann::json make_member(const Workshop& workshop, const Identity& identity) {
   const std::string name = identity.name(), run = state.run(name);
   const std::string data = state.captures() + "/" + name;
   const auto clean_up = [&] {
-    for (const std::string& folder : {run, state.frozen_run(name), state.scratch_run(name), data})
+    for (const std::string& folder : {run, state.frozen_run(name), state.scratch_run(name)})
       fs::remove_all(folder);
+    if (!workshop.keep_captures) fs::remove_all(data);
   };
   if (fs::exists(state.row(name)) && fs::exists(state.member(name))) {
     clean_up();  // it may have been killed just before

@@ -1,5 +1,5 @@
 // One member of a population, from nothing to its avatar package: its person is captured, its UNet
-// trained from the shared initial weights, measured against the truth, packed; then capture and run
+// trained from the shared initial weights, measured against the truth, packed; then run and capture
 // are removed.
 #pragma once
 
@@ -23,6 +23,7 @@ struct Workshop {
   const std::vector<ports::MotionClip>& motions;
   const std::vector<std::string>& sources;  // of the motions
   std::string makehuman;
+  bool keep_captures = false;  // of members that are done
 };
 
 // Makes the capture of an identity in folder/ID, or finishes it. One thread. Throws InputError or

@@ -7,7 +7,8 @@
 //   initial/                   the shared initial weights: weights.safetensors when they are done,
 //                              history.csv, the rounds before; of a shared network, its run and
 //                              shared.fgn, the avatar of its learners' mean map
-//   captures/ID, runs/ID       while a member is made; removed when it is done
+//   captures/ID, runs/ID       while a member is made; removed when it is done, captures unless
+//                              they are to be kept
 //   members/ID.fgn, ID.json    the avatar (float weights, no picture) and what it was measured to
 //                              be; ID.jpg: held-out pictures beside the
 //                              truth

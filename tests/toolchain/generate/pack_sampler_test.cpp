@@ -45,6 +45,9 @@ class PackSampler : public testing::Test {
     request.run = path("layer"), request.settings.space.variant = Variant::kLayer,
     request.settings.schedule.budget.iterations = 2;
     train_sampler(request);
+    request.run = path("velocity"), request.settings.space.variant = Variant::kBasis,
+    request.settings.shape.prediction = Prediction::kVelocity;
+    train_sampler(request);
   }
   static void TearDownTestSuite() { fs::remove_all(folder()); }
 
@@ -280,6 +283,9 @@ TEST_F(PackSampler, RefusesWhatDoesNotFit) {
   bad = options();
   bad.run = path("layer");
   EXPECT_NE(refusal(bad).find("layer"), std::string::npos) << refusal(bad);
+  bad.run = path("velocity");
+  EXPECT_NE(refusal(bad).find("prediction velocity has no package"), std::string::npos)
+      << refusal(bad);
   bad.run = path("nowhere");
   EXPECT_NE(refusal(bad).find("nowhere"), std::string::npos) << refusal(bad);
 }

@@ -197,6 +197,35 @@ TEST_F(SamplerTraining, GoesOnWithTheSameBitsOnMixedPeople) {
   EXPECT_NE(refusal(mapless).find("no static values"), std::string::npos);
 }
 
+// The loss of a velocity is |eps - x|^2 where nothing is known: 2.
+TEST_F(SamplerTraining, LearnsByFlowMatching) {
+  SamplerRequest flow = request("flow", Variant::kBasis, 250);
+  flow.settings.shape.prediction = Prediction::kVelocity;
+  const SamplerResult result = train_sampler(flow);
+  std::printf("  loss %.3f, validation %.3f\n", result.loss, result.validation_loss);
+  EXPECT_LT(result.loss, 1.6);
+  EXPECT_TRUE(std::isfinite(result.validation_loss));
+  EXPECT_EQ(TrainedSampler::open(path("flow")).transformer->shape().prediction,
+            Prediction::kVelocity);
+}
+
+TEST_F(SamplerTraining, GoesOnWithTheSameBitsUnderDropout) {
+  const auto dropping = [&](const std::string& run, double share) {
+    SamplerRequest request = this->request(run);
+    request.settings.dropout = share;
+    return request;
+  };
+  train_sampler(dropping("whole", 0.2));
+  SamplerRequest cut = dropping("cut", 0.2);
+  cut.stop_after = 31;
+  EXPECT_THROW(train_sampler(cut), train::Interrupted);
+  cut.resume = true, cut.stop_after = 0;
+  train_sampler(cut);
+  EXPECT_EQ(weights("cut"), weights("whole"));
+  train_sampler(request("none"));
+  EXPECT_NE(weights("none"), weights("whole"));
+}
+
 TEST_F(SamplerTraining, NeverLooksAtTheTestPart) {
   train_sampler(request("before"));
   tests::write_people(path("people.fgn"), true);

@@ -114,6 +114,50 @@ TEST(Transformer, Bfloat16IsNearFloat) {
   EXPECT_LT((exact - rounded).norm().item<float>(), 0.03f * exact.norm().item<float>());
 }
 
+// With nothing in its last layer it says that nobody moves: x = y, which is off by t (eps - x).
+TEST(Transformer, OfFlowMatchingSaysTheWayToTheNoise) {
+  TransformerShape shape = kSmall;
+  shape.prediction = Prediction::kVelocity;
+  Transformer flow(shape, 3), clean(kSmall, 3);
+  const torch::Tensor x = random_rows(4, 10, 1), noise = random_rows(4, 10, 2),
+                      lambda = torch::tensor({-6.0, -1.0, 0.5, 4.6}, torch::kFloat64);
+  const torch::Tensor ratio = lambda.exp().unsqueeze(1), sigma = 1 / torch::sqrt(1 + ratio * ratio),
+                      alpha = ratio * sigma;
+  const torch::Tensor t = sigma / (alpha + sigma), y = (1 - t) * x + t * noise;
+  const torch::Tensor z = (alpha * x + sigma * noise).to(torch::kFloat32);
+  EXPECT_LT((noise_share(lambda).unsqueeze(1) - t).abs().max().item<double>(), 1e-7);
+  EXPECT_LT((flow.forward(z, lambda) - y).abs().max().item<double>(), 2e-6);
+  const torch::Tensor added =
+      0.05 * torch::randn({flow.weights().numel()}, at::make_generator<at::CPUGeneratorImpl>(9));
+  flow.weights().add_(added), clean.weights().add_(added);
+  // The same network sees y and says v.
+  const torch::Tensor v = clean.forward(y.to(torch::kFloat32), lambda);
+  EXPECT_GT(v.abs().max().item<float>(), 1e-3);
+  EXPECT_LT((flow.forward(z, lambda) - (y - t * v)).abs().max().item<double>(), 5e-6);
+}
+
+// Left out and scaled up: the mean stays, and the same seed leaves out the same.
+TEST(Transformer, DropoutKeepsTheMeanOfWhatBlocksAdd) {
+  TransformerShape shape = kSmall;
+  shape.blocks = 1;
+  Transformer transformer(shape, 3);
+  transformer.weights().add_(0.05 * torch::randn({transformer.weights().numel()},
+                                                 at::make_generator<at::CPUGeneratorImpl>(9)));
+  const torch::Tensor z = random_rows(1, 10, 1).expand({4000, 10}).contiguous(),
+                      lambda = torch::zeros({4000}, torch::kFloat64);
+  const torch::Tensor whole = transformer.forward(z, lambda).mean(0);
+  const auto dropped = [&](uint64_t seed) {
+    torch::manual_seed(seed);
+    return transformer.forward(z, lambda, false, 0.02);
+  };
+  const torch::Tensor one = dropped(1);
+  EXPECT_TRUE(torch::equal(one, dropped(1)));
+  EXPECT_FALSE(torch::equal(one, dropped(2)));
+  const torch::Tensor spread = one.std(0, false);
+  EXPECT_GT(spread.min().item<float>(), 0);
+  EXPECT_LT(((one.mean(0) - whole).abs() / spread).max().item<float>(), 0.15);
+}
+
 TEST(Transformer, RefusesShapesThatCannotBe) {
   const auto refused = [](auto bend) {
     TransformerShape shape = kSmall;
@@ -126,6 +170,11 @@ TEST(Transformer, RefusesShapesThatCannotBe) {
   refused([](TransformerShape& s) { s.blocks = 0; });
   EXPECT_EQ(to_json(shape_from_json(to_json(kSmall), "here")), to_json(kSmall));
   EXPECT_THROW(shape_from_json({{"d_model", 3}}, "here"), InputError);
+  nlohmann::json json = to_json(kSmall);
+  json["prediction"] = "noise";
+  EXPECT_THROW(shape_from_json(json, "here"), InputError);
+  json.erase("prediction");  // before there were two
+  EXPECT_EQ(shape_from_json(json, "here").prediction, Prediction::kClean);
 }
 
 }  // namespace

@@ -16,12 +16,13 @@ using measure::Token;
 constexpr Eigen::Index kMembers = 40, kSize = 24;
 
 const std::vector<Token>& tokens() {
-  static const std::vector<Token> all{{"layer.0", 0, 4},
-                                      {"shape", 4, 4},
-                                      {"static.0.head.0", 8, 4},
-                                      {"static.0.upper_body.0", 12, 4},
-                                      {"static.0.upper_body.1", 16, 4},
-                                      {"static.1.head.0", 20, 4}};
+  using enum measure::BodyPart;
+  static const std::vector<Token> all{{"layer.0", 0, 4, {}},
+                                      {"shape", 4, 4, {}},
+                                      {"static.0.head.0", 8, 4, kHead},
+                                      {"static.0.upper_body.0", 12, 4, kUpperBody},
+                                      {"static.0.upper_body.1", 16, 4, kUpperBody},
+                                      {"static.1.head.0", 20, 4, kHead}};
   return all;
 }
 

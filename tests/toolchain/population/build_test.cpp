@@ -68,6 +68,16 @@ size_t entries(const std::string& folder) {
                             : 0;
 }
 
+fs::file_time_type newest_image(const std::string& folder) {
+  fs::file_time_type newest{};
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    const fs::path kind = entry.path().extension();
+    if (kind == ".jpg" || kind == ".png") newest = std::max(newest, entry.last_write_time());
+  }
+  EXPECT_NE(newest, fs::file_time_type{});
+  return newest;
+}
+
 // Before anybody is photographed: a line a clip, and an error where it cannot be what is asked.
 TEST(BuildPopulation, SaysWhatItsMotionsAreAndRefusesWhatTheyCannotBe) {
   nlohmann::json recipe = testing_tools::small_recipe();
@@ -214,6 +224,22 @@ TEST(BuildPopulation, OfOneNetworkHoldsItOnceAndAMapForEach) {
   EXPECT_EQ(bytes_of(State{again.folder.path("state")}.initial_weights()),
             bytes_of(state.initial_weights()))
       << "whatever the number of slots";
+  // On images that another population of the same people left it makes the same members, and no
+  // image anew.
+  one_slot.initial_weights_only = false;
+  one_slot.keep_captures = true;
+  build(one_slot);
+  const State kept{again.folder.path("state")}, third{place.folder.path("third")};
+  EXPECT_EQ(entries(kept.captures()), 4u);
+  fs::create_directories(third.folder);
+  fs::rename(kept.captures(), third.captures());
+  const fs::file_time_type before = newest_image(third.captures());
+  BuildOptions options = place.options("third");
+  options.keep_captures = true;
+  build(options);
+  EXPECT_EQ(newest_image(third.captures()), before);
+  for (const char* name : kPeople)
+    EXPECT_EQ(bytes_of(third.member(name)), bytes_of(kept.member(name)));
 }
 
 TEST(BuildPopulation, KilledAnywhereItGoesOnToTheSameBits) {
