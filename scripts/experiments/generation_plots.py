@@ -20,7 +20,9 @@ import matplotlib.pyplot as plot
 import results
 
 COLOURS = {"layer": "#1f77b4", "flat": "#ff7f0e", "latent": "#2ca02c", "basis": "#d62728",
-           "shipped": "#d62728", "alone": "#9467bd"}
+           "shipped": "#d62728", "alone": "#9467bd", "mixed": "#8c564b", "velocity": "#e377c2",
+           "dropout": "#7f7f7f", "decay": "#bcbd22"}
+TOKENS = ("layer", "flat", "latent", "basis", "shipped")  # the others differ in something else
 
 
 def variant_of(run):
@@ -31,7 +33,7 @@ def draw_entropy(axes, generation, rows):
     for name, style in (("nano", "-"), ("edge", "--")):
         for run in generation.get(name, {}).get("runs", []):
             entropy = run.get("posterior_entropy")
-            if entropy is None or "_" in run["name"]:
+            if entropy is None or run["name"] not in TOKENS:
                 continue
             own = [row for row in rows if (row["population"], row["run"]) == (name, run["name"])]
             levels = [(float(row["dimension_snr"]), float(row["nats"])) for row in own]
@@ -52,6 +54,8 @@ def draw_people(axes, report):
         points = sorted(((row["learnt_from"], row["novelty"]["pictures"]) for row in of_variant
                          if "novelty" in row), key=lambda point: point[0])
         size, colour = [size for size, _ in points], COLOURS[variant]
+        if len(points) < 2:
+            continue
         axes.semilogx(size, [100 * novelty["copy_share"] for _, novelty in points], "o-",
                       color=colour, label=f"{variant}: near copies, %")
         axes.semilogx(size, [100 * novelty["median_ratio"] for _, novelty in points], "s:",
@@ -72,7 +76,7 @@ def draw_losses(axes, path):
     with open(path, encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for run in dict.fromkeys(row["run"] for row in rows):
-        if "_" in run:
+        if "_" in run or run == "velocity":  # whose loss is of something else
             continue
         own = [row for row in rows if row["run"] == run]
         iterations = [int(row["iteration"]) for row in own]

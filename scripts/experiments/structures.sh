@@ -21,9 +21,9 @@
 # FOLDER (default out/structures) keeps every step: run it again and it goes on where it stopped.
 #
 # Environment: LEARNERS (12 at edge, 60 at nano), PEOPLE (6, 15), ITERATIONS of a person (1000,
-# 600), SAMPLER_ITERATIONS (1500); STATE, a population's state folder made with --keep-captures:
-# its body, and the first of its training people in its pictures, in place of captures of this
-# script's own. On two quiet cores forty minutes each.
+# 600), SIZE of their pictures (512x512, 128x128), SAMPLER_ITERATIONS (1500); STATE, a population's
+# state folder made with --keep-captures: its body, and the first of its training people in its
+# pictures, in place of captures of this script's own. On two quiet cores forty minutes each.
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
@@ -33,12 +33,12 @@ folder=${2:-out/structures}/$scale
 case $scale in
   edge)
     learners=${LEARNERS:-12} people=${PEOPLE:-6} iterations=${ITERATIONS:-1000}
-    pictures=(--frames 50 --views 6 --bust-views 3 --size 512x512)
+    pictures=(--frames 50 --views 6 --bust-views 3 --size "${SIZE:-512x512}")
     preset=(--preset edge) uv=128
     ;;
   nano)
     learners=${LEARNERS:-60} people=${PEOPLE:-15} iterations=${ITERATIONS:-600}
-    pictures=(--frames 30 --views 6 --bust-views 2 --size 128x128)
+    pictures=(--frames 30 --views 6 --bust-views 2 --size "${SIZE:-128x128}")
     preset=(--preset nano --static-grids all:T --network-size 16) uv=32
     ;;
   *) die "structures: '$scale': edge or nano" ;;

@@ -1,6 +1,6 @@
 # Sourced by the scripts of this folder, in the checkout and with $folder, which keeps every step:
-# the toolchain built (and the programs in the array $programs), `train` and `device` to call it,
-# the commit that reports name.
+# the toolchain built (and the programs in the array $programs) unless FIGURINE_BUILT is set,
+# `train` and `device` to call it, the commit that reports name.
 
 build=build/dev
 started=$SECONDS
@@ -13,10 +13,12 @@ commit_here() {
 }
 export FIGURINE_COMMIT=${FIGURINE_COMMIT:-$(commit_here | tr -d '\n')}
 
-scripts/setup toolchain
-step "building"
-scripts/run cmake --preset dev > /dev/null
-scripts/run cmake --build --preset dev --target figurine-train "${programs[@]}" > /dev/null
+[ -n "${FIGURINE_BUILT:-}" ] || {
+  scripts/setup toolchain
+  step "building"
+  scripts/run cmake --preset dev > /dev/null
+  scripts/run cmake --build --preset dev --target figurine-train "${programs[@]}" > /dev/null
+}
 mkdir -p "$folder" docs/results
 
 # Trains the sampler RUN by the options, or goes on with it; a finished one is left alone. Needs

@@ -63,6 +63,18 @@ class SamplerTraining : public testing::Test {
     return all;
   }
 
+  // Trains "whole", and "cut", which is stopped half-way and goes on. of: the request of a run.
+  void expect_the_same_bits_after_a_stop(
+      const std::function<SamplerRequest(const std::string&)>& of) const {
+    train_sampler(of("whole"));
+    SamplerRequest cut = of("cut");
+    cut.stop_after = 31;
+    EXPECT_THROW(train_sampler(cut), train::Interrupted);
+    cut.resume = true, cut.stop_after = 0;
+    train_sampler(cut);
+    EXPECT_EQ(weights("cut"), weights("whole"));
+  }
+
   std::string refusal(const SamplerRequest& request) const {
     try {
       train_sampler(request);
@@ -175,13 +187,7 @@ TEST_F(SamplerTraining, GoesOnWithTheSameBitsOnMixedPeople) {
     request.settings.mixed_share = share, request.settings.pieces = pieces;
     return request;
   };
-  train_sampler(mixing("whole", 0.8));
-  SamplerRequest cut = mixing("cut", 0.8);
-  cut.stop_after = 31;
-  EXPECT_THROW(train_sampler(cut), train::Interrupted);
-  cut.resume = true, cut.stop_after = 0;
-  train_sampler(cut);
-  EXPECT_EQ(weights("cut"), weights("whole"));
+  expect_the_same_bits_after_a_stop([&](const std::string& run) { return mixing(run, 0.8); });
   train_sampler(mixing("members", 0));
   EXPECT_NE(weights("members"), weights("whole"));
   train_sampler(mixing("pieces", 0.8, 12));
@@ -210,18 +216,11 @@ TEST_F(SamplerTraining, LearnsByFlowMatching) {
 }
 
 TEST_F(SamplerTraining, GoesOnWithTheSameBitsUnderDropout) {
-  const auto dropping = [&](const std::string& run, double share) {
+  expect_the_same_bits_after_a_stop([&](const std::string& run) {
     SamplerRequest request = this->request(run);
-    request.settings.dropout = share;
+    request.settings.dropout = 0.2;
     return request;
-  };
-  train_sampler(dropping("whole", 0.2));
-  SamplerRequest cut = dropping("cut", 0.2);
-  cut.stop_after = 31;
-  EXPECT_THROW(train_sampler(cut), train::Interrupted);
-  cut.resume = true, cut.stop_after = 0;
-  train_sampler(cut);
-  EXPECT_EQ(weights("cut"), weights("whole"));
+  });
   train_sampler(request("none"));
   EXPECT_NE(weights("none"), weights("whole"));
 }
