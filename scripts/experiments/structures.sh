@@ -188,7 +188,7 @@ if [ "$scale" = nano ]; then
     learn_sampler() {
       finished "$folder/samplers/$ways" ||
         train sampler --population "$population" --body "$body" --variant basis --rank 32 \
-          --size small --iterations "${SAMPLER_ITERATIONS:-1500}" --learning-rate 5e-4 --threads 2 \
+          --size small --iterations "${SAMPLER_ITERATIONS:-1500}" --learning-rate 5e-4 --threads 1 \
           -o "$folder/samplers/$ways"
     }
     learn_sampler
