@@ -7,7 +7,8 @@
 #
 # FOLDER (default out/texel_maps) keeps every step: run it again and it goes on where it stopped.
 # SOURCE (default out/population/NAME) is the state folder of the population, made with
-# --keep-captures. Writes FOLDER/NAME/population.fgn, and NAME_texels in docs/results/generation.json.
+# --keep-captures. Writes FOLDER/NAME/population.fgn, and NAME_texels in
+# docs/results/generation.json.
 # Half an hour of two cores at `nano`.
 #
 # The network that all members share is one of zeros: what is drawn is what `--network none` draws.
@@ -17,7 +18,7 @@ cd "$figurine_checkout"
 
 name=${1:?nano} folder=${2:-out/texel_maps}
 source=${SOURCE:-out/population/$name} recipe=toolchain/population/$name.json
-for file in "$source/body.fgn" "$source/initial/weights.safetensors" "$source/captures" "$recipe"; do
+for file in "$source"/{body.fgn,initial/weights.safetensors,captures} "$recipe"; do
   [ -r "$file" ] || die "texel_maps: $file: no such file"
 done
 . scripts/experiments/tools.sh
