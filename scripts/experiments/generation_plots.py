@@ -1,9 +1,10 @@
 """Draws docs/results/generation.json and the CSV files beside it: where members are decided, what
 more people to learn from change, how the trainings went.
 
-    generation_plots.py RESULTS OUTPUT
+    generation_plots.py RESULTS NAME OUTPUT
 
-RESULTS is docs/results; OUTPUT a PNG. Needs scripts/setup plots.
+RESULTS is docs/results; NAME the population whose people and trainings are drawn (where members
+are decided, `edge` beside); OUTPUT a PNG. Needs scripts/setup plots.
 """
 
 import csv
@@ -29,8 +30,8 @@ def variant_of(run):
     return re.sub(r"_.*", "", run)
 
 
-def draw_entropy(axes, generation, rows):
-    for name, style in (("nano", "-"), ("edge", "--")):
+def draw_entropy(axes, generation, rows, population):
+    for name, style in ((population, "-"), ("edge", "--")):
         for run in generation.get(name, {}).get("runs", []):
             entropy = run.get("posterior_entropy")
             if entropy is None or run["name"] not in TOKENS:
@@ -47,7 +48,7 @@ def draw_entropy(axes, generation, rows):
     axes.legend(fontsize=7)
 
 
-def draw_people(axes, report):
+def draw_people(axes, report, population):
     rows = {row["name"]: row for row in report["rows"]}
     for variant in ("layer", "basis"):
         of_variant = [row for name, row in rows.items() if variant_of(name) == variant]
@@ -65,14 +66,14 @@ def draw_people(axes, report):
                  label="held-out people: near copies, %")
     axes.axhline(100 * held_out["median_ratio"], color="grey", linewidth=0.8, linestyle=":",
                  label="held-out people: nearest member, %")
-    axes.set(xlabel="people to learn from", title="Copies and newness of samples, nano")
+    axes.set(xlabel="people to learn from", title=f"Copies and newness of samples, {population}")
     axes.set_xticks([50, 100, 250, 500], ["50", "100", "250", "500"])
     axes.minorticks_off()
     axes.set_ylim(top=210)  # room for the legend
     axes.legend(fontsize=7, loc="upper right")
 
 
-def draw_losses(axes, path):
+def draw_losses(axes, path, population):
     with open(path, encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for run in dict.fromkeys(row["run"] for row in rows):
@@ -86,17 +87,18 @@ def draw_losses(axes, path):
         losses = [float(row["validation_loss"]) for row in checked]
         axes.plot(iterations, losses, ":", color=COLOURS[run])
     axes.set(xlabel="iteration", ylabel="mean square error of clean values",
-             title="Loss at nano (dotted: validation members)")
+             title=f"Loss at {population} (dotted: validation members)")
     axes.legend(fontsize=7)
 
 
 def main():
-    folder, output = pathlib.Path(sys.argv[1]), sys.argv[2]
+    folder, population, output = pathlib.Path(sys.argv[1]), sys.argv[2], sys.argv[3]
     generation = json.loads((folder / "generation.json").read_text())
     figure, axes = plot.subplots(1, 3, figsize=(15, 4.4), dpi=80)
-    draw_entropy(axes[0], generation, results.read_rows(folder / "generation_entropy.csv"))
-    draw_people(axes[1], generation["nano"])
-    draw_losses(axes[2], folder / "sampler_loss_nano.csv")
+    draw_entropy(axes[0], generation, results.read_rows(folder / "generation_entropy.csv"),
+                 population)
+    draw_people(axes[1], generation[population], population)
+    draw_losses(axes[2], folder / f"sampler_loss_{population}.csv", population)
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()

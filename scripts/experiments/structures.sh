@@ -54,13 +54,6 @@ else
   . scripts/experiments/people.sh
 fi
 
-# Two at a time, one core each.
-beside() {
-  while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n; done
-  "$@" &
-}
-all() { while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done; }
-
 link_people() {  # NAME COUNT: the state's people under numbers from 0
   local number=0 person
   mkdir -p "$folder/$1"
@@ -130,7 +123,7 @@ for name in $(names "$learners"); do
   beside learn "$folder/tuned/$name" --data "$folder/learners/$name" \
     --init "$shared/$name" --iterations $((iterations / 3)) --views-per-pose 2 --threads 1
 done
-all
+wait_all
 basis=$folder/basis.safetensors
 [ -e "$basis" ] || train basis --shared "$shared" "${runs[@]}" --rank 32 -o "$basis"
 
@@ -142,7 +135,7 @@ if [ "$scale" = edge ]; then
     beside learn "$run" --data "$folder/people/$name" --iterations "$iterations" \
       --views-per-pose 2 --threads 1
   done
-  all
+  wait_all
   for name in $(names "$people"); do
     run=$folder/runs/scratch/people_$name
     [ "$run/evaluation.json" -nt "$run/weights.safetensors" ] ||
@@ -155,7 +148,7 @@ way free
 way map --freeze-network
 way scale_4 --network-rank 4 --network-adapter scale
 way basis_8 --network-rank 8 "${on_basis[@]}"
-all
+wait_all
 
 if [ "$scale" = nano ]; then
   split=$folder/split.json
@@ -177,7 +170,7 @@ if [ "$scale" = nano ]; then
     for run in "$folder/runs/$ways"/*; do
       beside pack_one "$run" "$members/$(basename "$run").fgn" "${own[@]}"
     done
-    all
+    wait_all
     population=$folder/$ways.fgn
     [ -e "$population" ] ||
       train pack --population "$members" "${together[@]}" --split "$split" --name "$ways" \

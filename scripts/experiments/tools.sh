@@ -32,13 +32,19 @@ learn() {
   fi
 }
 
-# All of the array $runs, two at a time; options_of RUN sets the array $own.
+# Two at a time, one core each.
+beside() {
+  while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n; done
+  "$@" &
+}
+wait_all() { while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done; }
+
+# All of the array $runs; options_of RUN sets the array $own.
 learn_all() {
   local run
   for run in "${runs[@]}"; do
-    while [ "$(jobs -rp | wc -l)" -ge 2 ]; do wait -n; done
     options_of "$run"
-    learn "$folder/$run" "${own[@]}" &
+    beside learn "$folder/$run" "${own[@]}"
   done
-  while [ "$(jobs -rp | wc -l)" -gt 0 ]; do wait -n; done
+  wait_all
 }

@@ -9,7 +9,7 @@
 # May be stopped and killed at any time; called again it goes on. Two trainings at a time, a core
 # each; the evaluation takes all. Writes the population's object in docs/results/generation.json,
 # the trainings' losses as docs/results/sampler_loss_NAME.csv, docs/sampler_variants_NAME.jpg and
-# docs/sampler_curves.png.
+# docs/sampler_curves_NAME.png.
 #
 # layer, flat, latent, basis: what a token is. The others are basis with one thing changed: mixed
 # (people mixed by part), velocity (flow matching), dropout, decay (weight decay), basis_N (the
@@ -63,6 +63,6 @@ train evaluate generation --population "$population" --body "$body" --features "
 scripts/run python3 scripts/experiments/variants_report.py "$folder" "$name" "$pictures/results" \
   "scripts/experiments/variants.sh $name" "${runs[@]}"
 scripts/setup plots
-scripts/run python3 scripts/experiments/generation_plots.py "$pictures/results" \
-  "$pictures/sampler_curves.png"
+scripts/run python3 scripts/experiments/generation_plots.py "$pictures/results" "$name" \
+  "$pictures/sampler_curves_$name.png"
 step "done: $pictures"

@@ -131,7 +131,7 @@ void add_sampler_command(CLI::App& app) {
   command
       ->add_option("--prediction", arguments->prediction,
                    "What the transformer says: clean values, or velocity (flow matching; has no "
-                   "package yet)")
+                   "package)")
       ->check(ports::one_of({"clean", "velocity"}));
   command
       ->add_option("--dropout", settings.dropout,

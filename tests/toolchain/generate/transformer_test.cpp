@@ -148,14 +148,16 @@ TEST(Transformer, DropoutKeepsTheMeanOfWhatBlocksAdd) {
   const torch::Tensor whole = transformer.forward(z, lambda).mean(0);
   const auto dropped = [&](uint64_t seed) {
     torch::manual_seed(seed);
-    return transformer.forward(z, lambda, false, 0.02);
+    return transformer.forward(z, lambda, false, 0.05);
   };
   const torch::Tensor one = dropped(1);
   EXPECT_TRUE(torch::equal(one, dropped(1)));
   EXPECT_FALSE(torch::equal(one, dropped(2)));
   const torch::Tensor spread = one.std(0, false);
   EXPECT_GT(spread.min().item<float>(), 0);
-  EXPECT_LT(((one.mean(0) - whole).abs() / spread).max().item<float>(), 0.15);
+  const float off = ((one.mean(0) - whole).abs() / spread).max().item<float>();
+  std::printf("  off by %.3f deviations\n", double(off));
+  EXPECT_LT(off, 0.15);
 }
 
 TEST(Transformer, RefusesShapesThatCannotBe) {
