@@ -11,7 +11,9 @@
 # docs/sampler_copies.png.
 #
 # Environment: RUNS, which of them are trained and judged (all; a name is MEMBERS_alone_ITERATIONS,
-# MEMBERS_mixed_ITERATIONS or one of those below).
+# MEMBERS_mixed_ITERATIONS or one of those below). Remedies beside mixing, of 100 people alone:
+# decay (of weights), dropout, small (a quarter of the weights). Other ways to mix: half of a batch,
+# pieces (smaller tokens).
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/../environment.sh"
 cd "$figurine_checkout"
@@ -31,21 +33,22 @@ if [ -z "${RUNS:-}" ]; then
       RUNS+=" ${members}_mixed_$iterations ${members}_alone_$iterations"
     done
   done
-  RUNS+=' decay small pieces half'
+  RUNS+=' decay dropout small pieces half'
 fi
 read -ra runs <<< "$RUNS"
 
 options_of() {
-  local run=$1 iterations=2000 members=100 mixed=0
-  own=(--variant basis --rank 90 --size device --blocks 4 --bf16 --learning-rate 5e-4)
+  local run=$1 iterations=4000 members=100 mixed=1
+  own=(--variant basis --rank 90 --size device --blocks 4 --precision auto --learning-rate 5e-4)
   case $run in
-    decay) own+=(--weight-decay 0.3) ;;
-    small) own+=(--size small --blocks 2) ;;
-    pieces) mixed=0.9 own+=(--pieces 12) ;;
+    decay) mixed=0 own+=(--weight-decay 0.3) ;;
+    dropout) mixed=0 own+=(--dropout 0.1) ;;
+    small) mixed=0 own+=(--size small --blocks 2) ;;
+    pieces) own+=(--pieces 12) ;;
     half) mixed=0.5 ;;
     *)
       members=${run%%_*} iterations=${run##*_}
-      case $run in *mixed*) mixed=0.9 ;; esac
+      case $run in *alone*) mixed=0 ;; esac
       ;;
   esac
   own+=(--iterations "$iterations" --members "$members" --mixed "$mixed" --body "$body" --quiet)

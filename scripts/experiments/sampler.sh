@@ -36,11 +36,11 @@ package=samples/samplers/$name.fgn
 judge() {
   train evaluate generation --population "$population" --body "$body" --features "$features" "$@"
 }
-basis=(--variant basis --rank 90 --size device --blocks 4 --bf16 --learning-rate 5e-4
+basis=(--variant basis --rank 90 --size device --blocks 4 --precision auto --learning-rate 5e-4
   --body "$body")
 learn "$folder/alone" "${basis[@]}" --iterations 4000
-[ "$minutes" = 0 ] || learn "$folder/layer" --variant layer --size device --blocks 6 --bf16 \
-  --learning-rate 2e-4 --minutes "$minutes" --body "$body"
+[ "$minutes" = 0 ] || learn "$folder/layer" --variant layer --size device --blocks 6 \
+  --precision auto --learning-rate 2e-4 --minutes "$minutes" --body "$body"
 if [ -z "${SHIPPED:-}" ]; then
   learn "$folder/shipped" "${basis[@]}" --iterations "$iterations" --mixed 1
   step "packing"
@@ -75,16 +75,22 @@ tile() {  # FILTER OUT INPUT...
 }
 tile crop=150:256,tile=16x4 "docs/sampler_$name.jpg" -i "$folder/people/%02d.png"
 tile tile=8x4 "docs/sampler_bust_$name.jpg" -i "$folder/people/bust_%02d.png"
-# The first 16 above, the training member that looks most like each below.
+# The first 16 above, the training member that looks most like each below, all in one pose.
+device pose --from samples/packages/walk.fgn --frame 30 -o "$folder/pose.json"
 scripts/run python3 scripts/experiments/nearest.py "$folder/generation.json" shipped \
   > "$folder/nearest.txt"
+posed() {  # AVATAR NAME
+  device render "$1" --size 256x256 --background grey --pose "$folder/pose.json" \
+    -o "$folder/people/$2.png"
+}
 number=0
 while read -r member; do
-  device render "$population#$member" --size 256x256 --background grey \
-    -o "$folder/people/nearest_$(printf %02d "$number").png"
+  seed=$(printf %02d "$number")
+  posed "$folder/people/$seed.fgn" "posed_$seed"
+  posed "$population#$member" "nearest_$seed"
   number=$((number + 1))
 done < "$folder/nearest.txt"
-tile crop=90:256,tile=16x1 "$folder/first.png" -i "$folder/people/%02d.png"
+tile crop=90:256,tile=16x1 "$folder/first.png" -i "$folder/people/posed_%02d.png"
 tile crop=90:256,tile=16x1 "$folder/nearest.png" -i "$folder/people/nearest_%02d.png"
 scripts/run ffmpeg -v error -y -i "$folder/first.png" -i "$folder/nearest.png" \
   -filter_complex vstack -q:v 4 "docs/sampler_nearest_$name.jpg"

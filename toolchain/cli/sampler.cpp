@@ -11,6 +11,7 @@
 #include "toolchain/cli/threads.h"
 #include "toolchain/generate/sampler_trainer.h"
 #include "toolchain/train/run_directory.h"
+#include "toolchain/train/settings.h"
 
 namespace figurine::cli {
 
@@ -18,7 +19,7 @@ namespace {
 
 struct SamplerArguments {
   generate::SamplerRequest request;
-  std::string variant = "basis", size = "device", prediction = "clean";
+  std::string variant = "basis", size = "device", prediction = "clean", precision = "f32";
   std::optional<int64_t> d_model, blocks, heads, feed_forward;
   std::optional<double> minutes;
   std::optional<uint64_t> iterations;
@@ -34,6 +35,8 @@ void run(SamplerArguments arguments) {
   settings.shape.blocks = arguments.blocks.value_or(size.blocks);
   settings.shape.heads = arguments.heads.value_or(size.heads);
   settings.shape.feed_forward = arguments.feed_forward.value_or(size.feed_forward);
+  settings.bf16 =
+      arguments.precision == "bf16" || (arguments.precision == "auto" && train::has_fast_bf16());
   if (arguments.iterations)
     settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
   if (arguments.minutes)
@@ -152,8 +155,10 @@ void add_sampler_command(CLI::App& app) {
                    "Dimension times signal-to-noise ratio where sampling begins (default 0.1)")
       ->check(ports::between(1e-9, 100.0));
   command->add_option("--seed", settings.seed, "Of weights, order and noise (default 1)");
-  command->add_flag("--bf16,!--no-bf16", settings.bf16,
-                    "Matrix products in bfloat16 (default: float)");
+  command
+      ->add_option("--precision", arguments->precision,
+                   "Of matrix products (default f32; auto: bf16 where the CPU has it)")
+      ->check(ports::one_of({"auto", "f32", "bf16"}));
   add_threads_option(*command, settings.threads,
                      "Default: all cores; with --resume as many as the run began with");
   CLI::Option* iterations =

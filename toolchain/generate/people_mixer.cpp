@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "figurine/check.h"
 #include "figurine/texel_grid.h"
@@ -93,24 +92,30 @@ PeopleMixer::PeopleMixer(const RowMatrix& training, const WeightLayout& layout,
 void PeopleMixer::find_alike(const RowMatrix& colours, const RowMatrix& shapes) {
   const RowMatrix distances = relative_distances(colours) + relative_distances(shapes);
   const auto members = static_cast<size_t>(distances.rows());
-  const size_t kept = std::clamp<size_t>(
-      static_cast<size_t>(std::lround(kAlikeShare * static_cast<double>(members))), 2, members);
+  const size_t others = members - 1;
+  const size_t kept =
+      std::clamp(static_cast<size_t>(std::lround(kAlikeShare * static_cast<double>(members))),
+                 std::min<size_t>(2, others), others);
   for (size_t m = 0; m < members; ++m) {
-    std::vector<size_t>& others = alike_.emplace_back(members);
-    std::iota(others.begin(), others.end(), size_t{0});
-    std::ranges::stable_sort(others, {}, [&](size_t other) {
-      return other == m ? -1.0 : distances(Eigen::Index(m), Eigen::Index(other));
-    });
-    others.resize(kept);
+    std::vector<size_t>& alike = alike_.emplace_back();
+    for (size_t other = 0; other < members; ++other) {
+      if (other != m) alike.push_back(other);
+    }
+    std::ranges::stable_sort(
+        alike, {}, [&](size_t other) { return distances(Eigen::Index(m), Eigen::Index(other)); });
+    alike.resize(kept);
   }
 }
 
 MixedPerson PeopleMixer::draw(uint64_t seed, uint64_t counter, size_t base) const {
   const std::vector<size_t>& others = alike_[base];
-  const auto pick = [&](uint64_t stream) {
-    return others[random::random_bits(seed, stream, counter) % others.size()];
+  const auto pick = [&](uint64_t stream, size_t among) {
+    return static_cast<size_t>(random::random_bits(seed, stream, counter) % among);
   };
-  return {base, pick(kUpper), pick(kLower)};
+  const size_t upper = pick(kUpper, others.size());
+  if (others.size() == 1) return {base, others[upper], others[upper]};
+  const size_t lower = pick(kLower, others.size() - 1);  // of those that are not `upper`
+  return {base, others[upper], others[lower + (lower >= upper ? 1 : 0)]};
 }
 
 size_t PeopleMixer::donor(const MixedPerson& person, size_t token) const {

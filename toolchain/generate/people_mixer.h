@@ -25,7 +25,8 @@ struct MixedPerson {
 
 class PeopleMixer {
  public:
-  // Of every member there are this share of all, itself among them, that it takes clothes from.
+  // Of every member there are this share of all that it takes clothes from, but two at least where
+  // there are two others.
   static constexpr double kAlikeShare = 0.25;
 
   // training: [N,W] by the layout, which is the population's on this body. Throws InputError where
@@ -34,13 +35,15 @@ class PeopleMixer {
               const Population& population, const Body& body);
 
   size_t members() const { return alike_.size(); }  // N
-  // Those whose clothes suit the member, nearest first. The distance of two members is
+  // The others whose clothes suit the member, nearest first. The distance of two members is
   //   |c_a - c_b| / median |c_i - c_j| + |s_a - s_b| / median |s_i - s_j|,
   // c the mean of the hands' static colours, s the shape coefficients; what members do not have, or
   // have in common, does not count.
   const std::vector<size_t>& alike(size_t member) const { return alike_[member]; }
 
-  // One on the base of this member, a function of the three numbers.
+  // One on the base of this member, a function of the three numbers: of three different members,
+  // where there are three. Who wears two parts of one member is nearly that member, and a denoiser
+  // would learn to draw him.
   MixedPerson draw(uint64_t seed, uint64_t counter, size_t base) const;
   // Whose token this is, by its place in the layout.
   size_t donor(const MixedPerson& person, size_t token) const;
