@@ -48,15 +48,22 @@ def draw_entropy(axes, generation, rows, population):
     axes.legend(fontsize=7)
 
 
+def numbers_of_people(report):
+    """Of the variants that were trained on several numbers of people: the number and the novelty of
+    every training."""
+    series = {}
+    for variant in ("layer", "basis"):
+        points = [(row["learnt_from"], row["novelty"]["pictures"]) for row in report["rows"]
+                  if variant_of(row["name"]) == variant and "novelty" in row]
+        if len(points) > 1:
+            series[variant] = sorted(points, key=lambda point: point[0])
+    return series
+
+
 def draw_people(axes, report, population):
     rows = {row["name"]: row for row in report["rows"]}
-    for variant in ("layer", "basis"):
-        of_variant = [row for name, row in rows.items() if variant_of(name) == variant]
-        points = sorted(((row["learnt_from"], row["novelty"]["pictures"]) for row in of_variant
-                         if "novelty" in row), key=lambda point: point[0])
+    for variant, points in numbers_of_people(report).items():
         size, colour = [size for size, _ in points], COLOURS[variant]
-        if len(points) < 2:
-            continue
         axes.semilogx(size, [100 * novelty["copy_share"] for _, novelty in points], "o-",
                       color=colour, label=f"{variant}: near copies, %")
         axes.semilogx(size, [100 * novelty["median_ratio"] for _, novelty in points], "s:",
@@ -94,11 +101,13 @@ def draw_losses(axes, path, population):
 def main():
     folder, population, output = pathlib.Path(sys.argv[1]), sys.argv[2], sys.argv[3]
     generation = json.loads((folder / "generation.json").read_text())
-    figure, axes = plot.subplots(1, 3, figsize=(15, 4.4), dpi=80)
+    several = bool(numbers_of_people(generation[population]))
+    figure, axes = plot.subplots(1, 2 + several, figsize=(5 * (2 + several), 4.4), dpi=80)
     draw_entropy(axes[0], generation, results.read_rows(folder / "generation_entropy.csv"),
                  population)
-    draw_people(axes[1], generation[population], population)
-    draw_losses(axes[2], folder / f"sampler_loss_{population}.csv", population)
+    if several:
+        draw_people(axes[1], generation[population], population)
+    draw_losses(axes[-1], folder / f"sampler_loss_{population}.csv", population)
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
