@@ -1,4 +1,4 @@
-"""Draws docs/results/generation.json and the CSV files beside it: where members are decided, what
+"""Draws docs/results/generation*.json and the CSV files beside them: where members are decided, what
 more people to learn from change, how the trainings went.
 
     generation_plots.py RESULTS NAME OUTPUT
@@ -8,7 +8,6 @@ are decided, `edge` beside); OUTPUT a PNG. Needs scripts/setup plots.
 """
 
 import csv
-import json
 import pathlib
 import re
 import sys
@@ -19,6 +18,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plot
 
 import results
+from generation_files import read_generation
 
 COLOURS = {"layer": "#1f77b4", "flat": "#ff7f0e", "latent": "#2ca02c", "basis": "#d62728",
            "shipped": "#d62728", "alone": "#9467bd", "mixed": "#8c564b", "velocity": "#e377c2",
@@ -100,7 +100,7 @@ def draw_losses(axes, path, population):
 
 def main():
     folder, population, output = pathlib.Path(sys.argv[1]), sys.argv[2], sys.argv[3]
-    generation = json.loads((folder / "generation.json").read_text())
+    generation = read_generation(folder)
     several = bool(numbers_of_people(generation[population]))
     figure, axes = plot.subplots(1, 2 + several, figsize=(5 * (2 + several), 4.4), dpi=80)
     draw_entropy(axes[0], generation, results.read_rows(folder / "generation_entropy.csv"),

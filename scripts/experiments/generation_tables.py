@@ -1,11 +1,13 @@
-"""Prints the tables of docs/reports/sampler_*.md from docs/results/generation.json, in Markdown.
+"""Prints the tables of docs/reports/sampler_*.md from docs/results/generation*.json, in
+Markdown.
 
     generation_tables.py RESULTS NAME        NAME of the population: edge, nano
 """
 
-import json
 import pathlib
 import sys
+
+from generation_files import read_generation
 
 NETWORK = "figurine-features"
 
@@ -83,8 +85,7 @@ def table(titles, rows):
 
 
 def main():
-    report = json.loads((pathlib.Path(sys.argv[1]) / "generation.json").read_text())
-    rows = report[sys.argv[2]]["rows"]
+    rows = read_generation(pathlib.Path(sys.argv[1]))[sys.argv[2]]["rows"]
     distances = ["COV", "1-NNA", "COV, 1-NNA of draws"]
     for titles, cells_of in [
         (["MMD", *distances, "1-NNA, training", "copies", "nearest", "sharpness"], in_pictures),

@@ -4,8 +4,8 @@ sampler_loss_NAME.csv.
 
     sampler_report.py FOLDER NAME OUTPUT COMMAND
 
-FOLDER is that of scripts/experiments/sampler.sh. Objects of other names in generation.json stay;
-"shipped" says of the package that ships how far it is from what is wanted of it.
+FOLDER is that of scripts/experiments/sampler.sh. "shipped" says of the package that ships how far
+it is from what is wanted of it.
 """
 
 import pathlib
@@ -13,7 +13,8 @@ import re
 import sys
 
 import results
-from variants_report import merged_losses, write_generation
+from generation_files import read_generation, write_generation
+from variants_report import merged_losses
 
 
 def without_paths(report):
@@ -92,8 +93,8 @@ def describe_shipped(report, package):
 def main():
     folder, name, output = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3])
     head = results.head(sys.argv[4])
-    generation = results.read(output / "generation.json") or {}
-    before = generation.get(name, {})
+    before = read_generation(output).get(name, {})
+    generation = {}
     generation[name] = head | without_paths(results.read(folder / "generation.json"))
     keep_entropy(before, generation[name])
     generation["shipped"] = describe_shipped(

@@ -7,9 +7,8 @@
 #
 # FOLDER (default out/texel_maps) keeps every step: run it again and it goes on where it stopped.
 # SOURCE (default out/population/NAME) is the state folder of the population, made with
-# --keep-captures. Writes FOLDER/NAME/population.fgn, and NAME_texels in
-# docs/results/generation.json.
-# Half an hour of two cores at `nano`.
+# --keep-captures. Writes FOLDER/NAME/population.fgn and docs/results/generation_NAME_texels.json.
+# 45 minutes of two cores at `nano`, half of them the evaluation.
 #
 # The network that all members share is one of zeros: what is drawn is what `--network none` draws.
 set -euo pipefail

@@ -1,10 +1,9 @@
 """Puts an ablation's figures together: FOLDER/generation.json and the runs' losses ->
-docs/results/generation.json, generation_entropy.csv and sampler_loss_NAME.csv.
+docs/results/generation_NAME.json, generation_entropy.csv and sampler_loss_NAME.csv.
 
     variants_report.py FOLDER NAME OUTPUT COMMAND RUN...
 
-FOLDER is that of scripts/experiments/variants.sh. Nothing is computed here. Objects of other names
-in generation.json stay.
+FOLDER is that of scripts/experiments/variants.sh. Nothing is computed here.
 """
 
 import csv
@@ -12,6 +11,7 @@ import pathlib
 import sys
 
 import results
+from generation_files import read_generation, write_generation
 
 STEP = 100  # iterations between rows of the losses
 
@@ -52,43 +52,14 @@ def keep_others(before, now):
         now["runs"].append(run)
 
 
-def write_generation(output, generation):
-    """generation.json, sorted, and the posterior entropies of its runs, level by level, as
-    generation_entropy.csv. A run whose levels are not in its report keeps the rows it had."""
-    path = output / "generation_entropy.csv"
-    earlier = results.read_rows(path)
-    rows = []
-    for population, report in sorted(generation.items()):
-        for run in report.get("runs", []):
-            entropy = run.get("posterior_entropy")
-            if entropy is None:
-                continue
-            key = {"population": population, "run": run["name"]}
-            levels = entropy.pop("levels", None)
-            if levels is None:
-                rows += [row for row in earlier if key.items() <= row.items()]
-            else:
-                rows += [key | level for level in levels]
-    results.write_rows(path, rows)
-    results.write(output / "generation.json", sorted_keys(generation))
-
-
-def sorted_keys(value):
-    if isinstance(value, dict):
-        return {key: sorted_keys(value[key]) for key in sorted(value)}
-    return [sorted_keys(entry) for entry in value] if isinstance(value, list) else value
-
-
 def main():
     folder, name, output = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.argv[3])
     command, runs = sys.argv[4], sys.argv[5:]
     report = results.read(folder / "generation.json")
     del report["command"]  # of this machine's folders
-    generation = results.read(output / "generation.json") or {}
-    before = generation.get(name, {})
-    generation[name] = results.head(command) | report
-    keep_others(before, generation[name])
-    write_generation(output, generation)
+    now = results.head(command) | report
+    keep_others(read_generation(output).get(name, {}), now)
+    write_generation(output, {name: now})
 
     losses_path = output / f"sampler_loss_{name}.csv"
     results.write_text(losses_path, merged_losses(losses_path, folder, runs))

@@ -10,9 +10,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts/experiments"))
 sys.dont_write_bytecode = True
 
+import generation_files
 import population_report
 import results
-import variants_report
 
 MAX_BYTES = 128 << 10
 MAX_LIST = 40  # more entries of numbers than that are quantiles, or a CSV file
@@ -105,16 +105,30 @@ class Results(unittest.TestCase):
             output = pathlib.Path(folder)
             level = {"dimension_snr": 1.0, "nats": 2.0}
 
-            def generation(**levels):
+            def write(population, **levels):
                 entropies = {name: {"undecided_nats": 3.0} | more for name, more in levels.items()}
                 runs = [{"name": n, "posterior_entropy": e} for n, e in entropies.items()]
-                return {"edge": {"runs": runs}}
+                generation_files.write_generation(output, {population: {"runs": runs}})
 
-            variants_report.write_generation(output, generation(a={"levels": [level]}, b={}))
-            variants_report.write_generation(output, generation(a={}, b={"levels": [level] * 2}))
+            write("edge", a={"levels": [level]}, b={})
+            write("other", c={"levels": [level]})
+            write("edge", a={}, b={"levels": [level] * 2})
             rows = results.read_rows(output / "generation_entropy.csv")
-            self.assertEqual([row["run"] for row in rows], ["a", "b", "b"])
+            self.assertEqual([row["run"] for row in rows], ["a", "b", "b", "c"])
             self.assertNotIn("levels", (output / "generation.json").read_text())
+
+    def test_every_population_but_that_of_the_shipped_sampler_has_a_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            output = pathlib.Path(folder)
+            for name in ("edge", "other", "shipped"):
+                generation_files.write_generation(output, {name: {"is": name}})
+            generation_files.write_generation(output, {"other": {"is": "new"}})
+            self.assertEqual(results.read(output / "generation.json"),
+                             {"edge": {"is": "edge"}, "shipped": {"is": "shipped"}})
+            self.assertEqual(results.read(output / "generation_other.json"),
+                             {"other": {"is": "new"}})
+            self.assertEqual(set(generation_files.read_generation(output)),
+                             {"edge", "other", "shipped"})
 
     def test_files_are_small_enough_to_review(self):
         files = sorted((ROOT / "docs/results").glob("*.json"))
