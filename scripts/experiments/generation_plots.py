@@ -1,5 +1,5 @@
-"""Draws docs/results/generation*.json and the CSV files beside them: where members are decided, what
-more people to learn from change, how the trainings went.
+"""Draws docs/results/generation*.json and the CSV files beside them: where members are decided,
+what more people to learn from change, how the trainings went.
 
     generation_plots.py RESULTS NAME OUTPUT
 
