@@ -270,8 +270,11 @@ nlohmann::json audit(const MemberSet& set, const References& references, const R
   of_pictures["copy_distance_db"] = finite(psnr_db(seen.copy_distance));
   for (size_t s = 0; s < std::min(kNamed, seen.samples.size()); ++s)
     of_pictures["nearest"].push_back(set.name(set.training[seen.samples[s].member]));
+  const auto run = [&](size_t count, const std::function<void(size_t)>& piece) {
+    set.crew.run("blends", count, piece);
+  };
   return {{"novelty", {{"weights", describe(weights)}, {"pictures", of_pictures}}},
-          {"blends", describe(measure_blends(z, learnt_z))},
+          {"blends", describe(measure_blends(z, learnt_z, kMostBlended, run))},
           {"by_part", describe_parts(parts_of(set.standardisation.tokens()), z, learnt_z)},
           {"highpass_ratio", sharpness(pictures) / references.training_sharpness}};
 }

@@ -73,7 +73,7 @@ Novelty measure_novelty(const RowMatrix& to_training, const RowMatrix& training)
 }
 
 std::vector<BlendShare> measure_blends(const RowMatrix& samples, const RowMatrix& training,
-                                       size_t most) {
+                                       size_t most, const RunPieces& run) {
   FIG_CHECK(most >= 1, "at least one member");
   if (samples.rows() == 0 || training.rows() < 2)
     throw InputError("novelty: at least one sample and two members are needed");
@@ -86,12 +86,18 @@ std::vector<BlendShare> measure_blends(const RowMatrix& samples, const RowMatrix
   std::vector<BlendShare> shares(few + 1);
   for (size_t k = 0; k < few; ++k) shares[k].members = k + 1;
   shares[few].members = members;
+  const auto count = static_cast<size_t>(samples.rows());
+  for (BlendShare& share : shares) share.residuals.resize(count);
   const BlendSearch search(training);
-  for (Eigen::Index s = 0; s < samples.rows(); ++s) {
-    const Blends blends = search.closest(samples.row(s), few);
-    for (size_t k = 0; k < few; ++k)
-      shares[k].residuals.push_back(blends.of_few[k].relative_residual);
-    shares[few].residuals.push_back(blends.of_any.relative_residual);
+  const auto measure = [&](size_t s) {
+    const Blends blends = search.closest(samples.row(static_cast<Eigen::Index>(s)), few);
+    for (size_t k = 0; k < few; ++k) shares[k].residuals[s] = blends.of_few[k].relative_residual;
+    shares[few].residuals[s] = blends.of_any.relative_residual;
+  };
+  if (run) {
+    run(count, measure);
+  } else {
+    for (size_t s = 0; s < count; ++s) measure(s);
   }
   for (BlendShare& share : shares) {
     share.median_residual = quantile(share.residuals, 0.5);

@@ -19,6 +19,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "toolchain/generation/convex_blend.h"
@@ -51,6 +52,7 @@ Novelty measure_novelty(const measure::RowMatrix& to_training, const measure::Ro
 // A sample is explained where its relative residual is at most this: a blend has 99 % of what sets
 // it apart from the training mean.
 inline constexpr double kExplainedResidual = 0.1;
+inline constexpr size_t kMostBlended = 5;
 
 struct BlendShare {
   size_t members = 0;  // of a blend, at most; N: any number
@@ -58,10 +60,15 @@ struct BlendShare {
   double explained_share = 0;     // of the samples
   std::vector<double> residuals;  // [S] relative ones
 };
+// Calls piece(i) for i in [0, count), in any order, several at a time if it likes.
+using RunPieces = std::function<void(size_t count, const std::function<void(size_t)>& piece)>;
+
 // For blends of at most 1, 2, ..., `most` members, and of any number last. samples: [S,D];
-// training: [N,D]. Throws InputError without samples, below two members, if the sizes differ or a
-// value is not finite.
+// training: [N,D]. A sample is a piece for `run`, which the result does not depend on; without it
+// they follow each other. Throws InputError without samples, below two members, if the sizes differ
+// or a value is not finite.
 std::vector<BlendShare> measure_blends(const measure::RowMatrix& samples,
-                                       const measure::RowMatrix& training, size_t most = 5);
+                                       const measure::RowMatrix& training,
+                                       size_t most = kMostBlended, const RunPieces& run = {});
 
 }  // namespace figurine::generation

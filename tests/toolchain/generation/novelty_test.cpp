@@ -217,6 +217,23 @@ TEST(Novelty, DoesNotDependOnTheOrder) {
     EXPECT_NEAR(shares[k].median_residual, of_shuffled[k].median_residual, 1e-9);
 }
 
+TEST(Novelty, BlendsAreTheSameInAnyOrderOfPieces) {
+  const RowMatrix training = random_rows(8, 5, 13), samples = random_rows(6, 5, 14);
+  size_t pieces = 0;
+  const auto backwards = [&](size_t count, const std::function<void(size_t)>& piece) {
+    pieces = count;
+    for (size_t i = count; i-- > 0;) piece(i);
+  };
+  const std::vector<BlendShare> shares = measure_blends(samples, training, 3),
+                                of_pieces = measure_blends(samples, training, 3, backwards);
+  EXPECT_EQ(pieces, 6u);
+  ASSERT_EQ(shares.size(), of_pieces.size());
+  for (size_t k = 0; k < shares.size(); ++k) {
+    EXPECT_EQ(shares[k].residuals, of_pieces[k].residuals);
+    EXPECT_NE(shares[k].residuals[0], shares[k].residuals[1]);
+  }
+}
+
 TEST(Novelty, RefusesWhatSaysNothing) {
   const RowMatrix ones = RowMatrix::Ones(3, 3), none(0, 3);
   EXPECT_THROW(measure_novelty(none, ones), InputError);
