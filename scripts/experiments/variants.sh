@@ -7,9 +7,9 @@
 #
 # FOLDER (default out/variants) keeps every run.
 # May be stopped and killed at any time; called again it goes on. Two trainings at a time, a core
-# each; the evaluation takes all. Writes the population's object in docs/results/generation.json,
-# the trainings' losses as docs/results/sampler_loss_NAME.csv, docs/sampler_variants_NAME.jpg and
-# docs/sampler_curves_NAME.png.
+# each; the evaluation takes all, two minutes a row of 500 samples. Writes
+# docs/results/generation_NAME.json, the trainings' losses as docs/results/sampler_loss_NAME.csv,
+# docs/sampler_variants_NAME.jpg and docs/sampler_curves_NAME.png.
 #
 # layer, flat, latent, basis: what a token is. The others are basis with one thing changed: mixed
 # (people mixed by part), velocity (flow matching), dropout, decay (weight decay), basis_N (the
