@@ -10,6 +10,7 @@
 #include "ports/command_line/values.h"
 #include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/precision.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/cli/train_all.h"
 #include "toolchain/error.h"
@@ -141,10 +142,7 @@ void overlay(const AvatarArguments& arguments, train::TrainSettings& settings) {
     settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
   if (arguments.minutes)
     settings.schedule.budget = {.iterations = 0, .seconds = 60 * *arguments.minutes};
-  if (arguments.precision) {
-    settings.bf16 = *arguments.precision == "bf16" ||
-                    (*arguments.precision == "auto" && train::has_fast_bf16());
-  }
+  if (arguments.precision) settings.bf16 = asks_for_bf16(*arguments.precision);
   if (arguments.standoff)
     settings.standoff_weight = *arguments.standoff == "on" ? train::TrainSettings{}.standoff_weight
                                : *arguments.standoff == "off" ? 0
@@ -398,10 +396,8 @@ void add_avatar_command(CLI::App& app) {
       ->check(ports::one_of({"adamw", "muon"}));
   command->add_option("--weight-decay", arguments->weight_decay, "The optimiser's (default 0)")
       ->check(ports::not_negative());
-  command
-      ->add_option("--precision", arguments->precision,
-                   "Of the convolutions (default auto: bf16 where the CPU has it)")
-      ->check(ports::one_of({"auto", "f32", "bf16"}));
+  add_precision_option(*command, arguments->precision,
+                       "Of the convolutions (default auto: bf16 where the CPU has it)");
   command
       ->add_option("--background", arguments->background,
                    "Behind prediction and truth in the loss (default grey)")

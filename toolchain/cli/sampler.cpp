@@ -8,10 +8,10 @@
 #include "ports/command_line/values.h"
 #include "ports/host/process.h"
 #include "toolchain/cli/commands.h"
+#include "toolchain/cli/precision.h"
 #include "toolchain/cli/threads.h"
 #include "toolchain/generate/sampler_trainer.h"
 #include "toolchain/train/run_directory.h"
-#include "toolchain/train/settings.h"
 
 namespace figurine::cli {
 
@@ -35,8 +35,7 @@ void run(SamplerArguments arguments) {
   settings.shape.blocks = arguments.blocks.value_or(size.blocks);
   settings.shape.heads = arguments.heads.value_or(size.heads);
   settings.shape.feed_forward = arguments.feed_forward.value_or(size.feed_forward);
-  settings.bf16 =
-      arguments.precision == "bf16" || (arguments.precision == "auto" && train::has_fast_bf16());
+  settings.bf16 = asks_for_bf16(arguments.precision);
   if (arguments.iterations)
     settings.schedule.budget = {.iterations = *arguments.iterations, .seconds = 0};
   if (arguments.minutes)
@@ -155,10 +154,8 @@ void add_sampler_command(CLI::App& app) {
                    "Dimension times signal-to-noise ratio where sampling begins (default 0.1)")
       ->check(ports::between(1e-9, 100.0));
   command->add_option("--seed", settings.seed, "Of weights, order and noise (default 1)");
-  command
-      ->add_option("--precision", arguments->precision,
-                   "Of matrix products (default f32; auto: bf16 where the CPU has it)")
-      ->check(ports::one_of({"auto", "f32", "bf16"}));
+  add_precision_option(*command, arguments->precision,
+                       "Of matrix products (default f32; auto: bf16 where the CPU has it)");
   add_threads_option(*command, settings.threads,
                      "Default: all cores; with --resume as many as the run began with");
   CLI::Option* iterations =

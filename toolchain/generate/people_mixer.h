@@ -42,8 +42,7 @@ class PeopleMixer {
   const std::vector<size_t>& alike(size_t member) const { return alike_[member]; }
 
   // One on the base of this member, a function of the three numbers: of three different members,
-  // where there are three. Who wears two parts of one member is nearly that member, and a denoiser
-  // would learn to draw him.
+  // where there are three: who has two parts of one member is nearly that member, not a new person.
   MixedPerson draw(uint64_t seed, uint64_t counter, size_t base) const;
   // Whose token this is, by its place in the layout.
   size_t donor(const MixedPerson& person, size_t token) const;

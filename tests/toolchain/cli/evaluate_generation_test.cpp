@@ -106,9 +106,13 @@ TEST(EvaluateGeneration, JudgesASamplersPackageByTheDevicesOwnIntegers) {
   const ProgramRun made = tests::run_shell(
       FIGURINE_TRAIN
       " sampler --quiet --population people.fgn --size small --blocks 1 --rank 3 --members 3 "
-      "--iterations 2 -o run && " FIGURINE_TRAIN " pack run --body body.fgn -o sampler.fgn",
+      "--precision bf16 --iterations 2 -o run && " FIGURINE_TRAIN
+      " pack run --body body.fgn -o sampler.fgn",
       folder);
   ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(
+      nlohmann::json::parse(std::ifstream(folder.path("run/run.json"))).at("settings").at("bf16"),
+      true);
   const ProgramRun run = judge(
       folder, "--population people.fgn --no-baselines --sampler ours=sampler.fgn --run float=run");
   ASSERT_EQ(run.exit_code, 0) << run.err;
